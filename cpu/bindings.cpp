@@ -1,0 +1,228 @@
+// The Python face of the core. Arguments are checked in Python (wive/scene.py); here only what memory safety needs.
+#include <pybind11/numpy.h>
+#include <pybind11/pybind11.h>
+#include <pybind11/stl.h>
+
+#include <memory>
+#include <optional>
+#include <stdexcept>
+#include <string>
+
+#include "builder.h"
+#include "dispatch.h"
+#include "parallel.h"
+#include "render.h"
+
+namespace py = pybind11;
+
+namespace wive {
+namespace {
+
+template <class T>
+using Array = py::array_t<T, py::array::c_style>;
+
+// Rays to a thread at a time: large enough that handing them out costs nothing, small enough to share well.
+constexpr std::size_t rays_per_chunk = 1024;
+
+void expect(bool condition, const char* message) {
+    if (!condition) throw std::invalid_argument(message);
+}
+
+template <class T>
+void expect_shape(const Array<T>& array, py::ssize_t columns, const char* message) {
+    expect(array.ndim() == 2 && array.shape(1) == columns, message);
+}
+
+Accuracy parse_accuracy(const std::string& name) {
+    if (name == "fast") return Accuracy::fast;
+    expect(name == "watertight", "accuracy: expected 'fast' or 'watertight'");
+    return Accuracy::watertight;
+}
+
+ChildOrder parse_order(const std::string& name) {
+    if (name == "treelet") return ChildOrder::treelet;
+    if (name == "diagonal") return ChildOrder::diagonal;
+    expect(name == "none", "order: expected 'treelet', 'diagonal' or 'none'");
+    return ChildOrder::none;
+}
+
+// The tree together with the arrays it was built from, which rendering reads.
+class PyBvh {
+public:
+    PyBvh(Array<float> vertices, Array<std::int32_t> faces, const std::string& accuracy, const std::string& order,
+          unsigned threads)
+        : vertices_(std::move(vertices)), faces_(std::move(faces)) {
+        expect_shape(vertices_, 3, "vertices: expected shape (v, 3)");
+        expect_shape(faces_, 3, "faces: expected shape (f, 3)");
+        const BuildOptions options = {parse_accuracy(accuracy), parse_order(order), threads};
+        const Mesh view = mesh();
+        py::gil_scoped_release release;
+        bvh_ = std::make_unique<Bvh>(view, options);
+    }
+
+    const Bvh& bvh() const { return *bvh_; }
+    Mesh mesh() const {
+        return {vertices_.data(), static_cast<std::size_t>(vertices_.shape(0)), faces_.data(),
+                static_cast<std::size_t>(faces_.shape(0))};
+    }
+
+private:
+    Array<float> vertices_;
+    Array<std::int32_t> faces_;
+    std::unique_ptr<Bvh> bvh_;
+};
+
+struct Rays {
+    RayBatch batch;
+    std::size_t count;
+};
+
+Rays ray_batch(const Array<float>& origins, const Array<float>& directions, const Array<float>& tmin,
+               const Array<float>& tmax) {
+    expect_shape(origins, 3, "origins: expected shape (n, 3)");
+    expect_shape(directions, 3, "directions: expected shape (n, 3)");
+    const py::ssize_t n = origins.shape(0);
+    expect(directions.shape(0) == n, "directions: expected as many as origins");
+    expect(tmin.size() == 1 || tmin.size() == n, "tmin: expected one value or one a ray");
+    expect(tmax.size() == 1 || tmax.size() == n, "tmax: expected one value or one a ray");
+    const auto stride = [](const Array<float>& a) { return static_cast<std::size_t>(a.size() == 1 ? 0 : 1); };
+    return {{origins.data(), directions.data(), tmin.data(), tmax.data(), stride(tmin), stride(tmax)},
+            static_cast<std::size_t>(n)};
+}
+
+void trace(const Bvh& bvh, TraceBatch kernel, const Rays& rays, const HitBatch& hits, unsigned threads) {
+    expect(kernel != nullptr, "kernel: not made for this query");
+    const BvhView view = bvh.view();
+    py::gil_scoped_release release;
+    if (rays.count <= rays_per_chunk) return kernel(view, rays.batch, hits, 0, rays.count);
+    parallel_chunks(rays.count, rays_per_chunk, thread_count(threads), [&](std::size_t begin, std::size_t end) {
+        kernel(view, rays.batch, hits, begin, end);
+    });
+}
+
+py::tuple intersect(const PyBvh& self, const std::string& kernel, const Array<float>& origins,
+                    const Array<float>& directions, const Array<float>& tmin, const Array<float>& tmax, unsigned threads,
+                    unsigned, bool stats) {
+    const Rays rays = ray_batch(origins, directions, tmin, tmax);
+    const py::ssize_t n = origins.shape(0);
+    Array<float> t(n), uv({n, py::ssize_t{2}});
+    Array<std::int32_t> prim(n);
+    std::optional<Array<std::int32_t>> steps;
+    HitBatch hits;
+    hits.t = t.mutable_data();
+    hits.prim = prim.mutable_data();
+    hits.uv = uv.mutable_data();
+    if (stats) hits.stats = steps.emplace(std::vector<py::ssize_t>{n, 3}).mutable_data();
+    const auto accuracy = static_cast<std::size_t>(self.bvh().accuracy());
+    trace(self.bvh(), find_kernels(kernel).closest[accuracy][stats], rays, hits, threads);
+    return py::make_tuple(std::move(t), std::move(prim), std::move(uv), std::move(steps));
+}
+
+py::tuple occluded(const PyBvh& self, const std::string& kernel, const Array<float>& origins,
+                   const Array<float>& directions, const Array<float>& tmin, const Array<float>& tmax, unsigned threads,
+                   unsigned, bool stats) {
+    const Rays rays = ray_batch(origins, directions, tmin, tmax);
+    const py::ssize_t n = origins.shape(0);
+    Array<bool> mask(n);
+    std::optional<Array<std::int32_t>> steps;
+    HitBatch hits;
+    hits.occluded = mask.mutable_data();
+    if (stats) hits.stats = steps.emplace(std::vector<py::ssize_t>{n, 3}).mutable_data();
+    const auto accuracy = static_cast<std::size_t>(self.bvh().accuracy());
+    trace(self.bvh(), find_kernels(kernel).any[accuracy][stats], rays, hits, threads);
+    return py::make_tuple(std::move(mask), std::move(steps));
+}
+
+std::uint64_t render(const PyBvh& self, const std::string& kernel, const Array<float>& camera, Array<float> image,
+                     int row_begin, int row_end, int samples, int bounces, const std::string& albedo, std::uint32_t seed,
+                     unsigned threads) {
+    expect(camera.ndim() == 2 && camera.shape(0) == 4 && camera.shape(1) == 3, "camera: expected shape (4, 3)");
+    expect(image.ndim() == 3 && image.shape(2) == 3, "image: expected shape (height, width, 3)");
+    expect(0 <= row_begin && row_begin <= row_end && row_end <= image.shape(0), "rows: expected a range within the image");
+    expect(samples > 0 && bounces >= 0, "samples, bounces: expected at least 1 and 0");
+    expect(albedo == "gray" || albedo == "normals", "albedo: expected 'gray' or 'normals'");
+    const auto row = [&](py::ssize_t i) { return load_vec3(camera.data(i, 0)); };
+    const RenderJob job = {self.bvh().view(),
+                           self.mesh(),
+                           find_kernels(kernel).closest[static_cast<std::size_t>(self.bvh().accuracy())][0],
+                           {row(0), row(1), row(2), row(3)},
+                           static_cast<int>(image.shape(1)),
+                           static_cast<int>(image.shape(0)),
+                           samples,
+                           bounces,
+                           albedo == "normals" ? Albedo::normals : Albedo::gray,
+                           seed,
+                           image.mutable_data()};
+    py::gil_scoped_release release;
+    return render_rows(job, row_begin, row_end, thread_count(threads));
+}
+
+// A read-only array over memory that `owner` keeps alive.
+template <class T>
+py::array_t<T> view(py::handle owner, std::vector<py::ssize_t> shape, const T* data) {
+    py::array_t<T> array(std::move(shape), data, owner);
+    array.attr("setflags")(py::arg("write") = false);
+    return array;
+}
+
+template <std::size_t n>
+py::array_t<float> copy(const std::array<float, n>& values) {
+    return py::array_t<float>(static_cast<py::ssize_t>(n), values.data());
+}
+
+}  // namespace
+}  // namespace wive
+
+PYBIND11_MODULE(_cpu, m, py::mod_gil_not_used()) {
+    using namespace wive;
+    m.doc() = "The compiled core of wive.";
+    m.def("kernels", [] {
+        py::dict names;
+        for (const auto& [name, reason] : list_kernels()) names[py::str(name)] = reason;
+        return names;
+    });
+    const auto array = [](const char* name) { return py::arg(name).noconvert(); };
+    py::class_<PyBvh>(m, "Bvh")
+        .def(py::init<Array<float>, Array<std::int32_t>, const std::string&, const std::string&, unsigned>(),
+             array("vertices"), array("faces"), py::arg("accuracy") = "watertight", py::arg("order") = "treelet",
+             py::arg("threads") = 0)
+        .def_property_readonly("nodes", [](py::object self) {
+            const auto& nodes = self.cast<const PyBvh&>().bvh().nodes();
+            return view(self, {static_cast<py::ssize_t>(nodes.size()), 8, 8},
+                        reinterpret_cast<const std::uint32_t*>(nodes.data()));
+        })
+        .def_property_readonly("blocks", [](py::object self) {
+            const auto& blocks = self.cast<const PyBvh&>().bvh().blocks();
+            return view(self, {static_cast<py::ssize_t>(blocks.size()), 10, 4},
+                        reinterpret_cast<const std::uint32_t*>(blocks.data()));
+        })
+        .def_property_readonly("center", [](const PyBvh& self) {
+            const BvhView v = self.bvh().view();
+            return copy(std::array{v.center[0], v.center[1], v.center[2]});
+        })
+        .def_property_readonly("extent", [](const PyBvh& self) {
+            const BvhView v = self.bvh().view();
+            return copy(std::array{v.extent[0], v.extent[1], v.extent[2]});
+        })
+        .def_property_readonly("bounds", [](const PyBvh& self) {
+            return py::array_t<float>({2, 3}, self.bvh().bounds()[0].data());
+        })
+        .def_property_readonly("accuracy", [](const PyBvh& self) {
+            return self.bvh().accuracy() == Accuracy::fast ? "fast" : "watertight";
+        })
+        .def_property_readonly("depth", [](const PyBvh& self) { return self.bvh().depth(); })
+        .def_property_readonly("memory", [](const PyBvh& self) {
+            return self.bvh().nodes().bytes() + self.bvh().blocks().bytes();
+        })
+        .def_property_readonly("sah", [](const PyBvh& self) {
+            const Bvh::Sah sah = self.bvh().sah();
+            return py::make_tuple(sah.nodes, sah.blocks);
+        })
+        .def("intersect", &intersect, py::arg("kernel"), array("origins"), array("directions"), array("tmin"),
+             array("tmax"), py::arg("threads") = 0, py::arg("in_flight") = 0, py::arg("stats") = false)
+        .def("occluded", &occluded, py::arg("kernel"), array("origins"), array("directions"), array("tmin"),
+             array("tmax"), py::arg("threads") = 0, py::arg("in_flight") = 0, py::arg("stats") = false)
+        .def("render_rows", &render, py::arg("kernel"), array("camera"), array("image"), py::arg("row_begin"),
+             py::arg("row_end"), py::arg("samples"), py::arg("bounces"), py::arg("albedo"), py::arg("seed") = 0,
+             py::arg("threads") = 0);
+}

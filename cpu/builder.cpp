@@ -1,0 +1,283 @@
+#include "builder.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <stdexcept>
+#include <vector>
+
+#include "binary_tree.h"
+#include "collapse.h"
+#include "parallel.h"
+
+namespace wive {
+namespace {
+
+constexpr float infinity = std::numeric_limits<float>::infinity();
+constexpr std::uint32_t parallel_subtree = 1 << 14;  // subtrees of at most so many triangles are emitted by one thread
+
+// Planes relative to the centre, rounded outwards so that a box never shrinks.
+float plane_below(float plane, float center) {
+    const float p = plane - center;
+    return static_cast<double>(p) > static_cast<double>(plane) - center ? std::nextafter(p, -infinity) : p;
+}
+float plane_above(float plane, float center) {
+    const float p = plane - center;
+    return static_cast<double>(p) < static_cast<double>(plane) - center ? std::nextafter(p, infinity) : p;
+}
+
+// Writes wide nodes and triangle blocks. Children of a node stand side by side, then subtree after subtree.
+class Emitter {
+public:
+    Emitter(const BinaryTree& tree, const Mesh& mesh, const BuildOptions& options, const std::array<float, 3>& center)
+        : tree_(tree), mesh_(mesh), options_(options), center_(center) {}
+
+    struct Size {
+        std::uint32_t nodes = 0, blocks = 0;
+    };
+
+    void emit(unsigned threads, LargeArray<Node>& nodes, LargeArray<TriangleBlock>& blocks, int& depth) {
+        // First the top of the tree, which only plans; then each subtree below it, at a place known by its size.
+        const Treelet root = gather_root(tree_);
+        std::vector<Subtree> subtrees;
+        Size top = {1, 0};
+        plan_top(root, top, subtrees);
+        parallel_for(subtrees.size(), threads, [&](std::size_t i) { subtrees[i].size = measure(subtrees[i].slot); });
+        Size total = top;
+        for (Subtree& subtree : subtrees) {
+            subtree.first = total;
+            total.nodes += subtree.size.nodes;
+            total.blocks += subtree.size.blocks;
+        }
+        if (total.blocks > max_blocks) throw std::invalid_argument("faces: too many triangles for one scene");
+        nodes = LargeArray<Node>(total.nodes);
+        blocks = LargeArray<TriangleBlock>(std::max(total.blocks, 1u));
+        nodes_ = nodes.data();
+        blocks_ = blocks.data();
+        if (total.blocks == 0) clear_block(blocks_[0]);
+        Size cursor = {1, 0};
+        std::size_t next_subtree = 0;
+        depth = emit_top(root, 0, cursor, subtrees, next_subtree);
+        std::vector<int> depths(subtrees.size());
+        parallel_for(subtrees.size(), threads, [&](std::size_t i) {
+            Size at = subtrees[i].first;
+            depths[i] = subtrees[i].slot.leaf ? 0 : emit_subtree(subtrees[i].slot, subtrees[i].node, at);
+            if (subtrees[i].slot.leaf) write_leaf(subtrees[i].slot, at);
+        });
+        for (std::size_t i = 0; i < subtrees.size(); ++i) depth = std::max(depth, subtrees[i].depth + depths[i]);
+    }
+
+private:
+    // A slot whose whole content one thread emits; its own node's place was given by its parent.
+    struct Subtree {
+        Slot slot;
+        Size size, first;
+        std::uint32_t node = 0;
+        int depth = 0;
+    };
+
+    static bool is_top(const Slot& slot) { return !slot.leaf && slot.end - slot.begin > parallel_subtree; }
+
+    void plan_top(const Treelet& treelet, Size& top, std::vector<Subtree>& subtrees) const {
+        for (int i = 0; i < treelet.count; ++i) top.nodes += treelet.slots[static_cast<std::size_t>(i)].leaf ? 0 : 1;
+        for (int i = 0; i < treelet.count; ++i) {
+            const Slot& slot = treelet.slots[static_cast<std::size_t>(i)];
+            if (is_top(slot))
+                plan_top(gather_treelet(tree_, slot.split), top, subtrees);
+            else
+                subtrees.push_back({slot, {}, {}, 0, 0});
+        }
+    }
+
+    // Nodes and blocks below a slot, without the slot's own node.
+    Size measure(const Slot& slot) const {
+        if (slot.leaf) return {0, blocks_for(slot.end - slot.begin)};
+        const Treelet treelet = gather_treelet(tree_, slot.split);
+        Size size;
+        for (int i = 0; i < treelet.count; ++i) {
+            const Slot& child = treelet.slots[static_cast<std::size_t>(i)];
+            const Size below = measure(child);
+            size.nodes += below.nodes + (child.leaf ? 0 : 1);
+            size.blocks += below.blocks;
+        }
+        return size;
+    }
+
+    int emit_top(const Treelet& treelet, std::uint32_t place, Size& cursor, std::vector<Subtree>& subtrees,
+                 std::size_t& next_subtree) {
+        const std::uint32_t first_child = cursor.nodes;
+        for (int i = 0; i < treelet.count; ++i) cursor.nodes += treelet.slots[static_cast<std::size_t>(i)].leaf ? 0 : 1;
+        std::array<std::uint32_t, node_width> children{};
+        std::uint32_t child_node = first_child;
+        int deepest = 0;
+        for (int i = 0; i < treelet.count; ++i) {
+            const Slot& slot = treelet.slots[static_cast<std::size_t>(i)];
+            const std::uint32_t node = slot.leaf ? 0 : child_node++;
+            if (is_top(slot)) {
+                children[static_cast<std::size_t>(i)] = node;
+                const std::size_t first = next_subtree;
+                deepest = std::max(deepest, emit_top(gather_treelet(tree_, slot.split), node, cursor, subtrees, next_subtree));
+                for (std::size_t k = first; k < next_subtree; ++k) ++subtrees[k].depth;
+            } else {
+                Subtree& subtree = subtrees[next_subtree++];
+                subtree.node = node;
+                subtree.depth = 1;
+                children[static_cast<std::size_t>(i)] =
+                    slot.leaf ? leaf_child(subtree.first.blocks, subtree.size.blocks) : node;
+            }
+        }
+        write_node(nodes_[place], treelet, children);
+        return deepest + 1;
+    }
+
+    // Returns the depth of the subtree, its root counted.
+    int emit_subtree(const Slot& slot, std::uint32_t place, Size& cursor) {
+        const Treelet treelet = gather_treelet(tree_, slot.split);
+        std::array<std::uint32_t, node_width> children{};
+        for (int i = 0; i < treelet.count; ++i) {
+            const Slot& child = treelet.slots[static_cast<std::size_t>(i)];
+            children[static_cast<std::size_t>(i)] = child.leaf ? write_leaf(child, cursor) : cursor.nodes++;
+        }
+        write_node(nodes_[place], treelet, children);
+        int deepest = 0;
+        for (int i = 0; i < treelet.count; ++i) {
+            const Slot& child = treelet.slots[static_cast<std::size_t>(i)];
+            if (!child.leaf) deepest = std::max(deepest, emit_subtree(child, children[static_cast<std::size_t>(i)], cursor));
+        }
+        return deepest + 1;
+    }
+
+    Box box_of(const Slot& slot) const {
+        Box box;
+        if (!slot.leaf || slot.end - slot.begin > block_width) {
+            const BinaryNode& node = tree_.nodes[slot.split];
+            box.lo = Float4v{node.lo[0], node.lo[1], node.lo[2], 0};
+            box.hi = Float4v{node.hi[0], node.hi[1], node.hi[2], 0};
+            return box;
+        }
+        for (std::uint32_t i = slot.begin; i < slot.end; ++i) box.grow(tree_.refs[i].box());
+        return box;
+    }
+
+    void write_node(Node& node, const Treelet& treelet, const std::array<std::uint32_t, node_width>& children) const {
+        for (int i = 0; i < node_width; ++i) {
+            const bool used = i < treelet.count;
+            const Box box = used ? box_of(treelet.slots[static_cast<std::size_t>(i)]) : Box{};
+            for (int axis = 0; axis < 3; ++axis) {
+                const float center = center_[static_cast<std::size_t>(axis)];
+                node.planes[2 * axis][i] = used ? plane_below(box.lo[axis], center) : empty_plane;
+                node.planes[2 * axis + 1][i] = used ? plane_above(box.hi[axis], center) : -empty_plane;
+            }
+            node.child[i] = children[static_cast<std::size_t>(i)];
+        }
+        const SlotSequences order = options_.order == ChildOrder::treelet    ? treelet.order
+                                    : options_.order == ChildOrder::diagonal ? sort_along_diagonals(node, treelet.count)
+                                                                             : slots_in_turn(treelet.count);
+        write_order(node, order, treelet.count);
+    }
+
+    static SlotSequences slots_in_turn(int count) {
+        return single_slot(count < node_width ? 0x76543210u & ((1u << 4 * count) - 1) : 0x76543210u);
+    }
+
+    std::uint32_t write_leaf(const Slot& slot, Size& cursor) const {
+        const std::uint32_t first = cursor.blocks;
+        std::array<std::uint32_t, block_width * max_leaf_blocks> prims;
+        const std::uint32_t count = slot.end - slot.begin;
+        for (std::uint32_t i = 0; i < count; ++i) prims[i] = tree_.refs[slot.begin + i].prim();
+        std::sort(prims.begin(), prims.begin() + count);
+        for (std::uint32_t i = 0; i < count; i += block_width) {
+            TriangleBlock& block = blocks_[cursor.blocks++];
+            if (count - i < block_width) clear_block(block);
+            for (std::uint32_t k = 0; k < std::min<std::uint32_t>(block_width, count - i); ++k)
+                write_triangle(block, k, prims[i + k]);
+        }
+        return leaf_child(first, cursor.blocks - first);
+    }
+
+    static void clear_block(TriangleBlock& block) {
+        for (auto& row : block.rows)
+            for (float& value : row) value = std::numeric_limits<float>::quiet_NaN();
+        for (std::int32_t& prim : block.prim) prim = -1;
+    }
+
+    void write_triangle(TriangleBlock& block, std::uint32_t lane, std::uint32_t prim) const {
+        for (int k = 0; k < 3; ++k) {
+            const float* corner = mesh_.corner(prim, k);
+            const float* first = mesh_.corner(prim, 0);
+            const bool edge = options_.accuracy == Accuracy::fast && k > 0;
+            for (int axis = 0; axis < 3; ++axis)
+                block.rows[3 * k + axis][lane] = edge ? corner[axis] - first[axis] : corner[axis];
+        }
+        block.prim[lane] = static_cast<std::int32_t>(prim);
+    }
+
+    // Larger than any plane with its slack, small enough that no arithmetic on it overflows.
+    static constexpr float empty_plane = 1e24f;
+
+    const BinaryTree& tree_;
+    const Mesh& mesh_;
+    const BuildOptions& options_;
+    const std::array<float, 3>& center_;
+    Node* nodes_ = nullptr;
+    TriangleBlock* blocks_ = nullptr;
+};
+
+}  // namespace
+
+Bvh::Bvh(const Mesh& mesh, const BuildOptions& options) : accuracy_(options.accuracy) {
+    const unsigned threads = thread_count(options.threads);
+    if (mesh.face_count >= leaf_bit) throw std::invalid_argument("faces: too many triangles for one scene");
+    check_mesh(mesh, threads);
+    std::size_t count = 0;
+    LargeArray<PrimRef> refs = make_prim_refs(mesh, threads, count);
+    const BinaryTree tree = build_binary_tree(std::move(refs), static_cast<std::uint32_t>(count), threads);
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+        bounds_[0][axis] = tree.box.lo[axis];
+        bounds_[1][axis] = tree.box.hi[axis];
+    }
+    if (count > 0) {
+        // Far from the origin, planes relative to the middle keep the boxes' slack small. Near it, the planes
+        // are left as they are, and so stay exact.
+        const Float4v middle = tree.box.lo * 0.5f + tree.box.hi * 0.5f;
+        const Float4v half = tree.box.hi * 0.5f - tree.box.lo * 0.5f;
+        const float size = std::max({half[0], half[1], half[2]});
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+            center_[axis] = std::abs(middle[axis]) > 4 * size ? middle[axis] : 0.0f;
+            extent_[axis] = std::max(plane_above(bounds_[1][axis], center_[axis]),
+                                     -plane_below(bounds_[0][axis], center_[axis]));
+        }
+    }
+    Emitter(tree, mesh, options, center_).emit(threads, nodes_, blocks_, depth_);
+}
+
+BvhView Bvh::view() const {
+    return {nodes_.data(), blocks_.data(), {center_[0], center_[1], center_[2]}, {extent_[0], extent_[1], extent_[2]}};
+}
+
+Bvh::Sah Bvh::sah() const {
+    const auto half_area = [](const Node& node, int lane) {
+        double d[3];
+        for (int axis = 0; axis < 3; ++axis)
+            d[axis] = static_cast<double>(node.planes[2 * axis + 1][lane]) - node.planes[2 * axis][lane];
+        return d[0] < 0 ? 0.0 : d[0] * d[1] + d[1] * d[2] + d[2] * d[0];
+    };
+    double d[3];
+    for (std::size_t axis = 0; axis < 3; ++axis) d[axis] = static_cast<double>(bounds_[1][axis]) - bounds_[0][axis];
+    const double root = d[0] * d[1] + d[1] * d[2] + d[2] * d[0];
+    if (!(root > 0 && root < std::numeric_limits<double>::infinity())) return {0, 0};
+    Sah sah = {1, 0};
+    for (std::size_t i = 0; i < nodes_.size(); ++i)
+        for (int lane = 0; lane < node_width; ++lane) {
+            const std::uint32_t child = nodes_[i].child[lane];
+            const double area = half_area(nodes_[i], lane) / root;
+            if (is_inner(child))
+                sah.nodes += area;
+            else
+                sah.blocks += area * leaf_block_count(child);
+        }
+    return sah;
+}
+
+}  // namespace wive

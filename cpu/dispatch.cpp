@@ -1,0 +1,62 @@
+#include "dispatch.h"
+
+#include <stdexcept>
+
+namespace wive {
+namespace {
+
+#if defined(__x86_64__)
+bool has_avx2() {
+    return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") && __builtin_cpu_supports("bmi2");
+}
+bool has_avx512() {
+    return has_avx2() && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl") &&
+           __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512bw");
+}
+#else
+bool has_avx2() { return false; }
+bool has_avx512() { return false; }
+#endif
+
+struct Entry {
+    std::string_view name;
+    const KernelTable* table;
+    bool runs;
+    std::string_view needs;
+};
+
+std::vector<Entry> entries() {
+    constexpr std::string_view avx512 = "AVX-512 F, VL, DQ and BW", avx2 = "AVX2, FMA and BMI2";
+    return {{"avx512", avx512_full_kernels(), has_avx512(), avx512},
+            {"avx512.full", avx512_full_kernels(), has_avx512(), avx512},
+            {"avx512.half", avx512_half_kernels(), has_avx512(), avx512},
+            {"avx2", avx2_kernels(), has_avx2(), avx2},
+            {"scalar", scalar_kernels(), true, ""},
+            {"scalar.distance", scalar_by_distance_kernels(), true, ""}};
+}
+
+std::string why_not(const Entry& entry) {
+    if (entry.table == nullptr) return "this build is for another processor architecture than x86-64";
+    if (!entry.runs) return "this processor lacks " + std::string(entry.needs);
+    return "";
+}
+
+}  // namespace
+
+std::vector<std::pair<std::string, std::string>> list_kernels() {
+    std::vector<std::pair<std::string, std::string>> list;
+    for (const Entry& entry : entries()) list.emplace_back(entry.name, why_not(entry));
+    return list;
+}
+
+const KernelTable& find_kernels(std::string_view name) {
+    for (const Entry& entry : entries()) {
+        if (entry.name != name) continue;
+        if (const std::string reason = why_not(entry); !reason.empty())
+            throw std::invalid_argument("kernel '" + std::string(name) + "' can't run here: " + reason);
+        return *entry.table;
+    }
+    throw std::invalid_argument("unknown kernel '" + std::string(name) + "'");
+}
+
+}  // namespace wive

@@ -1,0 +1,27 @@
+// The compiled kernels, one table an instruction set and form.
+#pragma once
+
+#include <string_view>
+
+#include "layout.h"
+#include "ray.h"
+
+namespace wive {
+
+using TraceBatch = void (*)(const BvhView&, const RayBatch&, const HitBatch&, std::size_t begin, std::size_t end);
+
+struct KernelTable {
+    std::string_view name;
+    // Indexed by accuracy, then by whether steps are counted. A null pointer: not made for this table.
+    TraceBatch closest[accuracy_count][2];
+    TraceBatch any[accuracy_count][2];
+};
+
+// Null where this build has no such kernels; whether the machine can run them is dispatch.h's business.
+const KernelTable* avx512_full_kernels();
+const KernelTable* avx512_half_kernels();
+const KernelTable* avx2_kernels();
+const KernelTable* scalar_kernels();
+const KernelTable* scalar_by_distance_kernels();
+
+}  // namespace wive

@@ -1,0 +1,51 @@
+// An uninitialised array on huge pages where the system has them: a tree is visited at random, and every visit
+// to a page that the translation buffer has forgotten costs as much as a missed cache line.
+#pragma once
+
+#include <cstddef>
+#include <cstdlib>
+#include <memory>
+#include <new>
+#include <type_traits>
+
+#if defined(__linux__)
+#include <sys/mman.h>
+#endif
+
+namespace wive {
+
+template <class T>
+class LargeArray {
+    static_assert(std::is_trivially_copyable_v<T> && std::is_trivially_destructible_v<T>);
+
+public:
+    LargeArray() = default;
+    explicit LargeArray(std::size_t size) : size_(size) {
+        if (size == 0) return;
+        constexpr std::size_t huge_page = std::size_t{2} << 20;
+        const std::size_t bytes = size * sizeof(T);
+        const std::size_t alignment = bytes >= huge_page ? huge_page : 64;
+        const std::size_t rounded = (bytes + alignment - 1) / alignment * alignment;
+        data_.reset(static_cast<T*>(std::aligned_alloc(alignment, rounded)));
+        if (!data_) throw std::bad_alloc();
+#if defined(__linux__)
+        if (alignment == huge_page) madvise(data_.get(), rounded, MADV_HUGEPAGE);
+#endif
+    }
+
+    T* data() { return data_.get(); }
+    const T* data() const { return data_.get(); }
+    std::size_t size() const { return size_; }
+    std::size_t bytes() const { return size_ * sizeof(T); }
+    T& operator[](std::size_t i) { return data_.get()[i]; }
+    const T& operator[](std::size_t i) const { return data_.get()[i]; }
+
+private:
+    struct Free {
+        void operator()(T* p) const { std::free(p); }
+    };
+    std::unique_ptr<T[], Free> data_;
+    std::size_t size_ = 0;
+};
+
+}  // namespace wive

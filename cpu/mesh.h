@@ -1,0 +1,45 @@
+// The caller's triangles: checked once, then boxed for the builder.
+#pragma once
+
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+
+#include "box.h"
+#include "large_array.h"
+
+namespace wive {
+
+struct Mesh {
+    const float* vertices;  // (vertex_count, 3)
+    std::size_t vertex_count;
+    const std::int32_t* faces;  // (face_count, 3)
+    std::size_t face_count;
+
+    const float* corner(std::size_t face, int k) const {
+        return vertices + 3 * static_cast<std::size_t>(faces[3 * face + static_cast<std::size_t>(k)]);
+    }
+};
+
+// A triangle's box and number, 32 bytes: the number rides in the low corner's fourth lane.
+struct PrimRef {
+    Float4v lo, hi;
+
+    std::uint32_t prim() const { return std::bit_cast<std::uint32_t>(static_cast<float>(lo[3])); }
+    Box box() const { return {lo, hi}; }
+    // Twice the box's centre. The number's bits are cleared first: as a float they would be a slow denormal.
+    Float4v centroid() const {
+        typedef std::int32_t Int4v __attribute__((vector_size(16)));
+        const Int4v xyz = {-1, -1, -1, 0};
+        return std::bit_cast<Float4v>(std::bit_cast<Int4v>(lo) & xyz) + hi;
+    }
+};
+
+// Throws std::invalid_argument naming the first vertex that is not a usable number, or the first face that
+// points outside the vertices.
+void check_mesh(const Mesh& mesh, unsigned threads);
+
+// One reference for each triangle with an area; zero-area triangles can't be hit and are left out.
+LargeArray<PrimRef> make_prim_refs(const Mesh& mesh, unsigned threads, std::size_t& count);
+
+}  // namespace wive

@@ -1,0 +1,47 @@
+#include "order.h"
+
+#include <algorithm>
+
+namespace wive {
+
+SlotSequences join(const SlotSequences& left, int left_count, const SlotSequences& right, int right_count, int axis) {
+    SlotSequences joined;
+    for (unsigned octant = 0; octant < 8; ++octant) {
+        const bool negative = octant >> axis & 1u;
+        joined[octant] = negative ? right[octant] | left[octant] << 4 * right_count
+                                  : left[octant] | right[octant] << 4 * left_count;
+    }
+    return joined;
+}
+
+SlotSequences sort_along_diagonals(const Node& node, int children) {
+    SlotSequences sequences{};
+    for (unsigned octant = 0; octant < 8; ++octant) {
+        std::array<float, node_width> key{};
+        std::array<std::uint32_t, node_width> slots{};
+        for (int i = 0; i < children; ++i) {
+            slots[static_cast<std::size_t>(i)] = static_cast<std::uint32_t>(i);
+            for (int axis = 0; axis < 3; ++axis) {
+                const float centre = node.planes[2 * axis][i] + node.planes[2 * axis + 1][i];
+                key[static_cast<std::size_t>(i)] += (octant >> axis & 1u) ? -centre : centre;
+            }
+        }
+        std::stable_sort(slots.begin(), slots.begin() + children,
+                         [&](std::uint32_t a, std::uint32_t b) { return key[a] < key[b]; });
+        for (int i = 0; i < children; ++i) sequences[octant] |= slots[static_cast<std::size_t>(i)] << 4 * i;
+    }
+    return sequences;
+}
+
+void write_order(Node& node, SlotSequences sequences, int children) {
+    for (int i = children; i < node_width; ++i)
+        for (std::uint32_t& sequence : sequences) sequence |= static_cast<std::uint32_t>(i) << 4 * i;
+    for (int i = 0; i < node_width; ++i) {
+        std::uint32_t lane = 0;
+        for (int octant = 0; octant < 8; ++octant)
+            lane |= (sequences[static_cast<std::size_t>(octant)] >> 4 * i & 15u) << 4 * octant;
+        node.order[i] = lane;
+    }
+}
+
+}  // namespace wive

@@ -1,0 +1,33 @@
+// The order in which a ray meets the children of a node: a fixed permutation for each of the eight sign octants.
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "layout.h"
+
+namespace wive {
+
+// treelet: a depth-first walk of the binary treelet that swaps sides where the ray is negative on the split axis
+// (the paper's). diagonal: children sorted along the octant's diagonal. none: by slot, for comparison.
+enum class ChildOrder { treelet, diagonal, none };
+
+// For each octant, slots from front to back, four bits each, the first in the lowest bits.
+using SlotSequences = std::array<std::uint32_t, 8>;
+
+// The sequence of a single slot, and of two treelets of which the ray meets `left` first where it is positive on
+// the axis. left_count: how many slots the left treelet has.
+constexpr SlotSequences single_slot(std::uint32_t slot) {
+    SlotSequences s{};
+    s.fill(slot);
+    return s;
+}
+SlotSequences join(const SlotSequences& left, int left_count, const SlotSequences& right, int right_count, int axis);
+
+// Slots sorted by their boxes' centres along each octant's diagonal.
+SlotSequences sort_along_diagonals(const Node& node, int children);
+
+// Writes the node's order row: lane i gets the i-th slot of every octant. Empty slots come last.
+void write_order(Node& node, SlotSequences sequences, int children);
+
+}  // namespace wive

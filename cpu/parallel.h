@@ -1,0 +1,53 @@
+// Work spread over threads that live for one call: nothing is left running, so a process may fork at any time.
+#pragma once
+
+#include <algorithm>
+#include <atomic>
+#include <cstddef>
+#include <exception>
+#include <system_error>
+#include <thread>
+#include <vector>
+
+namespace wive {
+
+inline unsigned thread_count(unsigned asked) {
+    return asked > 0 ? asked : std::max(1u, std::thread::hardware_concurrency());
+}
+
+// Calls work(i) once for every i in [0, count), on the calling thread and up to threads - 1 more.
+// The first exception of any of them is thrown again here, once all have stopped.
+template <class Work>
+void parallel_for(std::size_t count, unsigned threads, const Work& work) {
+    std::atomic<std::size_t> next{0};
+    std::atomic<bool> failed{false};
+    std::exception_ptr failure;
+    auto run = [&] {
+        try {
+            for (std::size_t i; (i = next.fetch_add(1, std::memory_order_relaxed)) < count;) work(i);
+        } catch (...) {
+            if (!failed.exchange(true)) failure = std::current_exception();
+            next.store(count, std::memory_order_relaxed);
+        }
+    };
+    const std::size_t helpers = std::min<std::size_t>(threads, count) - (count > 0 ? 1 : 0);
+    std::vector<std::thread> pool;
+    pool.reserve(helpers);
+    try {
+        while (pool.size() < helpers) pool.emplace_back(run);
+    } catch (const std::system_error&) {
+        // The machine has no more threads to give: the ones we have do the work.
+    }
+    run();
+    for (std::thread& thread : pool) thread.join();
+    if (failure) std::rethrow_exception(failure);
+}
+
+// The same in chunks of a fixed size: work(begin, end). Chunks do not depend on the number of threads.
+template <class Work>
+void parallel_chunks(std::size_t count, std::size_t chunk, unsigned threads, const Work& work) {
+    parallel_for((count + chunk - 1) / chunk, threads,
+                 [&](std::size_t i) { work(i * chunk, std::min(count, (i + 1) * chunk)); });
+}
+
+}  // namespace wive

@@ -1,0 +1,49 @@
+// What a query keeps of the hits it is offered.
+#pragma once
+
+#include <limits>
+
+#include "ray.h"
+
+namespace wive {
+
+// The nearest hit in [tmin, tmax]; of hits at the same t, the lowest prim, whatever order they are found in.
+struct ClosestHit {
+    float tmin, tmax;  // tmax shrinks to the best hit
+    float u = 0, v = 0;
+    std::uint32_t prim = no_prim;
+
+    [[gnu::always_inline]] bool offer(float t, float hit_u, float hit_v, std::uint32_t hit_prim) {
+        if (t >= tmin && (t < tmax || (t == tmax && hit_prim < prim))) {
+            tmax = t;
+            u = hit_u;
+            v = hit_v;
+            prim = hit_prim;
+        }
+        return false;
+    }
+    [[gnu::always_inline]] void write(const HitBatch& hits, std::size_t i, float scale) const {
+        const bool hit = prim != no_prim;
+        constexpr float nan = std::numeric_limits<float>::quiet_NaN();
+        hits.t[i] = hit ? tmax * scale : std::numeric_limits<float>::infinity();
+        hits.prim[i] = static_cast<std::int32_t>(prim);
+        if (hits.uv) {
+            hits.uv[2 * i] = hit ? u : nan;
+            hits.uv[2 * i + 1] = hit ? v : nan;
+        }
+    }
+};
+
+// Whether anything lies in [tmin, tmax].
+struct AnyHit {
+    float tmin, tmax;
+    bool hit = false;
+
+    [[gnu::always_inline]] bool offer(float t, float, float, std::uint32_t) {
+        hit = t >= tmin && t <= tmax;
+        return hit;
+    }
+    [[gnu::always_inline]] void write(const HitBatch& hits, std::size_t i, float) const { hits.occluded[i] = hit; }
+};
+
+}  // namespace wive

@@ -1,0 +1,29 @@
+// Rays and hits as the kernels see them.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+namespace wive {
+
+// Batches are flat arrays. tmin and tmax have one value for all rays (stride 0) or one a ray (stride 1).
+struct RayBatch {
+    const float* origins;     // (n, 3)
+    const float* directions;  // (n, 3)
+    const float* tmin;
+    const float* tmax;
+    std::size_t tmin_stride, tmax_stride;
+};
+
+// Where results go; a null pointer is an output nobody asked for.
+struct HitBatch {
+    float* t = nullptr;            // (n,) infinity on a miss
+    std::int32_t* prim = nullptr;  // (n,) -1 on a miss
+    float* uv = nullptr;           // (n, 2) NaN on a miss
+    bool* occluded = nullptr;      // (n,) any-hit queries write only this
+    std::int32_t* stats = nullptr; // (n, 3) inner nodes, leaves, triangles
+};
+
+inline constexpr std::uint32_t no_prim = 0xffffffffu;
+
+}  // namespace wive

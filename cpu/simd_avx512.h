@@ -1,0 +1,44 @@
+// AVX-512 wrapper types: the full form's eight lanes, the half form's sixteen, and the compress that gave them sense.
+#pragma once
+
+#include "simd_sse.h"
+#include "stack.h"
+
+namespace wive {
+
+struct Avx512 {
+    using Float4 = SseFloat4;
+
+    struct Float8 {
+        __m256 v;
+
+        WIVE_INLINE static Float8 load(const float* p) { return {_mm256_load_ps(p)}; }
+        WIVE_INLINE static Float8 all(float x) { return {_mm256_set1_ps(x)}; }
+        WIVE_INLINE friend Float8 multiply_add(Float8 a, Float8 b, Float8 c) { return {_mm256_fmadd_ps(a.v, b.v, c.v)}; }
+        WIVE_INLINE friend Float8 min(Float8 a, Float8 b) { return {_mm256_min_ps(a.v, b.v)}; }
+        WIVE_INLINE friend Float8 max(Float8 a, Float8 b) { return {_mm256_max_ps(a.v, b.v)}; }
+    };
+
+    // Slots in the octant's order. A permute reads the low three bits of an index, so nothing need be masked.
+    struct Order {
+        __m256i slots;
+        WIVE_INLINE Order(const std::uint32_t* row, unsigned shift)
+            : slots(_mm256_srl_epi32(_mm256_load_si256(reinterpret_cast<const __m256i*>(row)),
+                                     _mm_cvtsi32_si128(static_cast<int>(shift)))) {}
+    };
+
+    // Permutes the lanes into order, compresses those that hit and stores them at `top`; returns how many.
+    WIVE_INLINE static unsigned push(StackEntry* top, Order order, Float8 tnear, Float8 tfar, const std::uint32_t* child) {
+        const __m256 a = _mm256_permutevar8x32_ps(tnear.v, order.slots);
+        const __m256 b = _mm256_permutevar8x32_ps(tfar.v, order.slots);
+        const __m256i c = _mm256_permutevar8x32_epi32(_mm256_load_si256(reinterpret_cast<const __m256i*>(child)), order.slots);
+        const __mmask8 hit = _mm256_cmp_ps_mask(a, b, _CMP_LE_OQ);
+        const __m512i entries = _mm512_or_si512(_mm512_cvtepu32_epi64(_mm256_castps_si256(a)),
+                                                _mm512_slli_epi64(_mm512_cvtepu32_epi64(c), 32));
+        // A compress to a register and a plain store: compressing straight to memory is microcoded on some machines.
+        _mm512_storeu_si512(top, _mm512_maskz_compress_epi64(hit, entries));
+        return static_cast<unsigned>(_mm_popcnt_u32(hit));
+    }
+};
+
+}  // namespace wive

@@ -1,0 +1,40 @@
+// Four floats in a 128-bit register, shared by the AVX2 and the AVX-512 files. Every function is always inlined,
+// so no copy compiled for one instruction set can be linked into another.
+#pragma once
+
+#include <immintrin.h>
+
+#define WIVE_INLINE [[gnu::always_inline]] inline
+
+namespace wive {
+
+struct SseFloat4 {
+    __m128 v;
+
+    WIVE_INLINE static SseFloat4 load(const float* p) { return {_mm_load_ps(p)}; }
+    WIVE_INLINE static SseFloat4 all(float x) { return {_mm_set1_ps(x)}; }
+    WIVE_INLINE void store(float* p) const { _mm_store_ps(p, v); }
+    WIVE_INLINE friend SseFloat4 operator+(SseFloat4 a, SseFloat4 b) { return {_mm_add_ps(a.v, b.v)}; }
+    WIVE_INLINE friend SseFloat4 operator-(SseFloat4 a, SseFloat4 b) { return {_mm_sub_ps(a.v, b.v)}; }
+    WIVE_INLINE friend SseFloat4 operator*(SseFloat4 a, SseFloat4 b) { return {_mm_mul_ps(a.v, b.v)}; }
+    WIVE_INLINE friend SseFloat4 operator/(SseFloat4 a, SseFloat4 b) { return {_mm_div_ps(a.v, b.v)}; }
+    WIVE_INLINE friend SseFloat4 min(SseFloat4 a, SseFloat4 b) { return {_mm_min_ps(a.v, b.v)}; }
+    WIVE_INLINE friend SseFloat4 max(SseFloat4 a, SseFloat4 b) { return {_mm_max_ps(a.v, b.v)}; }
+    WIVE_INLINE friend SseFloat4 abs(SseFloat4 a) { return {_mm_andnot_ps(_mm_set1_ps(-0.0f), a.v)}; }
+    // a with its sign flipped where s is negative
+    WIVE_INLINE friend SseFloat4 flip_sign(SseFloat4 a, SseFloat4 s) {
+        return {_mm_xor_ps(a.v, _mm_and_ps(_mm_set1_ps(-0.0f), s.v))};
+    }
+    // Lane masks as bits, lane 0 lowest. A comparison with NaN is false.
+    WIVE_INLINE friend unsigned less_equal(SseFloat4 a, SseFloat4 b) {
+        return static_cast<unsigned>(_mm_movemask_ps(_mm_cmp_ps(a.v, b.v, _CMP_LE_OQ)));
+    }
+    // Lanes where low >= 0 or high <= 0.
+    WIVE_INLINE friend unsigned one_sided(SseFloat4 low, SseFloat4 high) {
+        const __m128 zero = _mm_setzero_ps();
+        return static_cast<unsigned>(_mm_movemask_ps(
+            _mm_or_ps(_mm_cmp_ps(low.v, zero, _CMP_GE_OQ), _mm_cmp_ps(high.v, zero, _CMP_LE_OQ))));
+    }
+};
+
+}  // namespace wive

@@ -1,0 +1,61 @@
+// Moeller and Trumbore 1997 on four triangles: fast, and as exact as float is. Neighbours may disagree on an edge.
+#pragma once
+
+#include "frame.h"
+#include "layout.h"
+
+namespace wive {
+
+template <class Isa>
+class FastTriangles {
+    using Float4 = typename Isa::Float4;
+
+public:
+    [[gnu::always_inline]] explicit FastTriangles(const RayFrame<Isa>& ray) {
+        for (int axis = 0; axis < 3; ++axis) {
+            origin_[axis] = Float4::all(ray.origin[axis]);
+            direction_[axis] = Float4::all(ray.direction[axis]);
+        }
+    }
+
+    // Offers every hit of the block to the query; true once the query is done.
+    template <class Query>
+    [[gnu::always_inline]] bool test(const TriangleBlock& block, Query& query) const {
+        const auto row = [&](int k, int axis) { return Float4::load(block.rows[3 * k + axis]); };
+        const Float4 e1[3] = {row(1, 0), row(1, 1), row(1, 2)}, e2[3] = {row(2, 0), row(2, 1), row(2, 2)};
+        Float4 p[3], s[3], q[3];
+        cross(direction_, e2, p);
+        for (int axis = 0; axis < 3; ++axis) s[axis] = origin_[axis] - row(0, axis);
+        cross(s, e1, q);
+        const Float4 det = dot(e1, p), size = abs(det), zero = Float4::all(0.0f);
+        const Float4 u = flip_sign(dot(s, p), det), v = flip_sign(dot(direction_, q), det);
+        // A determinant of zero (a ray in the triangle's plane) and NaN (an unused lane) must fail: size <= 0 is
+        // asked the other way round.
+        unsigned lanes = less_equal(zero, u) & less_equal(zero, v) & less_equal(u + v, size) & ~less_equal(size, zero);
+        if (lanes == 0) [[likely]] return false;
+        alignas(16) float ts[4], us[4], vs[4];
+        (flip_sign(dot(e2, q), det) / size).store(ts);
+        (u / size).store(us);
+        (v / size).store(vs);
+        for (; lanes != 0; lanes &= lanes - 1) {
+            const int lane = __builtin_ctz(lanes);
+            if (query.offer(ts[lane], us[lane], vs[lane], static_cast<std::uint32_t>(block.prim[lane]))) return true;
+        }
+        return false;
+    }
+
+private:
+    [[gnu::always_inline]] static void cross(const Float4* a, const Float4* b, Float4* c) {
+        for (int i = 0; i < 3; ++i) {
+            const int j = (i + 1) % 3, k = (i + 2) % 3;
+            c[i] = a[j] * b[k] - a[k] * b[j];
+        }
+    }
+    [[gnu::always_inline]] static Float4 dot(const Float4* a, const Float4* b) {
+        return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+    }
+
+    Float4 origin_[3], direction_[3];
+};
+
+}  // namespace wive

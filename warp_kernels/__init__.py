@@ -1,0 +1,1 @@
+"""The Warp backend's room: the same traversal as NVIDIA Warp kernels. Empty in this version."""

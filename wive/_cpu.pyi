@@ -1,0 +1,105 @@
+"""The compiled core: builds the tree, traces batches of rays, renders rows of a picture.
+
+Shapes: n rays, v vertices, f faces, m inner nodes, b triangle blocks. Every array is C-contiguous.
+This is the inner door of the package: `wive.Scene` checks arguments and is what users call.
+"""
+
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+def kernels() -> dict[str, str]:
+    """Every traversal kernel compiled in, best first, and why this machine can't run it ("" where it can).
+
+    Names: "avx512" (the better of the two forms below), "avx512.full", "avx512.half", "avx2", "scalar".
+    """
+
+class Bvh:
+    """The 8-wide tree over one mesh: built once, never changed, shared by every backend."""
+
+    def __init__(
+        self,
+        vertices: NDArray[np.float32],
+        faces: NDArray[np.int32],
+        accuracy: Literal["fast", "watertight"] = "watertight",
+        order: Literal["treelet", "diagonal", "none"] = "treelet",
+        threads: int = 0,
+    ) -> None:
+        """Build over vertices (v,3), faces (f,3). threads 0 means every core.
+
+        Raises ValueError naming the first bad vertex (NaN, infinite or beyond 1e18) or face (index out of range).
+        """
+    @property
+    def nodes(self) -> NDArray[np.uint32]:
+        """(m,8,8) read-only view, rows lo.x hi.x lo.y hi.y lo.z hi.z child order; planes are float32 bits."""
+    @property
+    def blocks(self) -> NDArray[np.uint32]:
+        """(b,10,4) read-only view: nine float32 rows (fast: v0 e1 e2; watertight: v0 v1 v2) and the prim row."""
+    @property
+    def center(self) -> NDArray[np.float32]:
+        """(3,) the point box planes are relative to."""
+    @property
+    def extent(self) -> NDArray[np.float32]:
+        """(3,) the largest |plane| on each axis: the half size of the tree round its center."""
+    @property
+    def bounds(self) -> NDArray[np.float32]:
+        """(2,3) lowest and highest corner of the triangles that can be hit; inf, -inf where there are none."""
+    @property
+    def accuracy(self) -> str: ...
+    @property
+    def depth(self) -> int:
+        """Inner nodes on the longest way from the root down."""
+    @property
+    def memory(self) -> int:
+        """Bytes of nodes and triangle blocks."""
+    @property
+    def sah(self) -> tuple[float, float]:
+        """Surface-area cost of inner nodes and of triangle blocks, relative to the root's area."""
+    def intersect(
+        self,
+        kernel: str,
+        origins: NDArray[np.float32],
+        directions: NDArray[np.float32],
+        tmin: NDArray[np.float32],
+        tmax: NDArray[np.float32],
+        threads: int = 0,
+        in_flight: int = 0,
+        stats: bool = False,
+    ) -> tuple[NDArray[np.float32], NDArray[np.int32], NDArray[np.float32], NDArray[np.int32] | None]:
+        """Closest hits: t (n,) inf on a miss, prim (n,) -1 on a miss, uv (n,2) NaN on a miss, stats (n,3) or None.
+
+        tmin and tmax have one element or n. stats columns: inner nodes, leaves, triangles tested.
+        The interpreter lock is released while rays are traced.
+        """
+    def occluded(
+        self,
+        kernel: str,
+        origins: NDArray[np.float32],
+        directions: NDArray[np.float32],
+        tmin: NDArray[np.float32],
+        tmax: NDArray[np.float32],
+        threads: int = 0,
+        in_flight: int = 0,
+        stats: bool = False,
+    ) -> tuple[NDArray[np.bool_], NDArray[np.int32] | None]:
+        """Whether anything lies in [tmin, tmax]: (n,) bool, and stats (n,3) or None."""
+    def render_rows(
+        self,
+        kernel: str,
+        camera: NDArray[np.float32],
+        image: NDArray[np.float32],
+        row_begin: int,
+        row_end: int,
+        samples: int,
+        bounces: int,
+        albedo: Literal["gray", "normals"],
+        seed: int = 0,
+        threads: int = 0,
+    ) -> int:
+        """Path-trace rows [row_begin, row_end) of image (height,width,3) in place; returns the rays traced.
+
+        camera (4,3): eye, then the vectors from the eye to the picture's centre, from its centre to the right
+        edge's middle, and from its centre to the top edge's middle. Linear radiance under a white sky of radiance 1.
+        Random numbers come from (pixel, sample, bounce) alone, so a picture does not depend on threads or kernel.
+        """
