@@ -187,12 +187,12 @@ PYBIND11_MODULE(_cpu, m, py::mod_gil_not_used()) {
              array("vertices"), array("faces"), py::arg("accuracy") = "watertight", py::arg("order") = "treelet",
              py::arg("threads") = 0)
         .def_property_readonly("nodes", [](py::object self) {
-            const auto& nodes = self.cast<const PyBvh&>().bvh().nodes();
+            const auto nodes = self.cast<const PyBvh&>().bvh().nodes();
             return view(self, {static_cast<py::ssize_t>(nodes.size()), 8, 8},
                         reinterpret_cast<const std::uint32_t*>(nodes.data()));
         })
         .def_property_readonly("blocks", [](py::object self) {
-            const auto& blocks = self.cast<const PyBvh&>().bvh().blocks();
+            const auto blocks = self.cast<const PyBvh&>().bvh().blocks();
             return view(self, {static_cast<py::ssize_t>(blocks.size()), 10, 4},
                         reinterpret_cast<const std::uint32_t*>(blocks.data()));
         })
@@ -212,7 +212,7 @@ PYBIND11_MODULE(_cpu, m, py::mod_gil_not_used()) {
         })
         .def_property_readonly("depth", [](const PyBvh& self) { return self.bvh().depth(); })
         .def_property_readonly("memory", [](const PyBvh& self) {
-            return self.bvh().nodes().bytes() + self.bvh().blocks().bytes();
+            return self.bvh().bytes();
         })
         .def_property_readonly("sah", [](const PyBvh& self) {
             const Bvh::Sah sah = self.bvh().sah();

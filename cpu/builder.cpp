@@ -34,10 +34,15 @@ public:
         : tree_(tree), mesh_(mesh), options_(options), center_(center) {}
 
     struct Size {
-        std::uint32_t nodes = 0, blocks = 0;
+        std::size_t nodes = 0, blocks = 0;
+    };
+    struct Result {
+        LargeArray<std::byte> units;
+        Size size;
+        int depth;
     };
 
-    void emit(unsigned threads, LargeArray<Node>& nodes, LargeArray<TriangleBlock>& blocks, int& depth) {
+    Result emit(unsigned threads) {
         // First the top of the tree, which only plans; then each subtree below it, at a place known by its size.
         const Treelet root = gather_root(tree_);
         std::vector<Subtree> subtrees;
@@ -50,15 +55,15 @@ public:
             total.nodes += subtree.size.nodes;
             total.blocks += subtree.size.blocks;
         }
-        if (total.blocks > max_blocks) throw std::invalid_argument("faces: too many triangles for one scene");
-        nodes = LargeArray<Node>(total.nodes);
-        blocks = LargeArray<TriangleBlock>(std::max(total.blocks, 1u));
-        nodes_ = nodes.data();
-        blocks_ = blocks.data();
-        if (total.blocks == 0) clear_block(blocks_[0]);
+        const std::size_t node_bytes = total.nodes * sizeof(Node), bytes = node_bytes + total.blocks * sizeof(TriangleBlock);
+        if (bytes / unit_bytes > max_units) throw std::invalid_argument("faces: too many triangles for one scene");
+        LargeArray<std::byte> units(bytes);
+        nodes_ = reinterpret_cast<Node*>(units.data());
+        blocks_ = reinterpret_cast<TriangleBlock*>(units.data() + node_bytes);
+        first_block_unit_ = node_bytes / unit_bytes;
         Size cursor = {1, 0};
         std::size_t next_subtree = 0;
-        depth = emit_top(root, 0, cursor, subtrees, next_subtree);
+        int depth = emit_top(root, 0, cursor, subtrees, next_subtree);
         std::vector<int> depths(subtrees.size());
         parallel_for(subtrees.size(), threads, [&](std::size_t i) {
             Size at = subtrees[i].first;
@@ -66,6 +71,7 @@ public:
             if (subtrees[i].slot.leaf) write_leaf(subtrees[i].slot, at);
         });
         for (std::size_t i = 0; i < subtrees.size(); ++i) depth = std::max(depth, subtrees[i].depth + depths[i]);
+        return {std::move(units), total, depth};
     }
 
 private:
@@ -73,9 +79,16 @@ private:
     struct Subtree {
         Slot slot;
         Size size, first;
-        std::uint32_t node = 0;
+        std::size_t node = 0;
         int depth = 0;
     };
+    using Children = std::array<std::uint32_t, node_width>;
+
+    static std::uint32_t node_child(std::size_t node) { return inner_child(node * (sizeof(Node) / unit_bytes)); }
+    std::uint32_t block_child(std::size_t first, std::size_t count) const {
+        return leaf_child(first_block_unit_ + first * (sizeof(TriangleBlock) / unit_bytes),
+                          static_cast<std::uint32_t>(count));
+    }
 
     static bool is_top(const Slot& slot) { return !slot.leaf && slot.end - slot.begin > parallel_subtree; }
 
@@ -104,18 +117,17 @@ private:
         return size;
     }
 
-    int emit_top(const Treelet& treelet, std::uint32_t place, Size& cursor, std::vector<Subtree>& subtrees,
+    int emit_top(const Treelet& treelet, std::size_t place, Size& cursor, std::vector<Subtree>& subtrees,
                  std::size_t& next_subtree) {
-        const std::uint32_t first_child = cursor.nodes;
+        std::size_t child_node = cursor.nodes;
         for (int i = 0; i < treelet.count; ++i) cursor.nodes += treelet.slots[static_cast<std::size_t>(i)].leaf ? 0 : 1;
-        std::array<std::uint32_t, node_width> children{};
-        std::uint32_t child_node = first_child;
+        Children children{};
         int deepest = 0;
         for (int i = 0; i < treelet.count; ++i) {
             const Slot& slot = treelet.slots[static_cast<std::size_t>(i)];
-            const std::uint32_t node = slot.leaf ? 0 : child_node++;
+            const std::size_t node = slot.leaf ? 0 : child_node++;
             if (is_top(slot)) {
-                children[static_cast<std::size_t>(i)] = node;
+                children[static_cast<std::size_t>(i)] = node_child(node);
                 const std::size_t first = next_subtree;
                 deepest = std::max(deepest, emit_top(gather_treelet(tree_, slot.split), node, cursor, subtrees, next_subtree));
                 for (std::size_t k = first; k < next_subtree; ++k) ++subtrees[k].depth;
@@ -124,7 +136,7 @@ private:
                 subtree.node = node;
                 subtree.depth = 1;
                 children[static_cast<std::size_t>(i)] =
-                    slot.leaf ? leaf_child(subtree.first.blocks, subtree.size.blocks) : node;
+                    slot.leaf ? block_child(subtree.first.blocks, subtree.size.blocks) : node_child(node);
             }
         }
         write_node(nodes_[place], treelet, children);
@@ -132,18 +144,19 @@ private:
     }
 
     // Returns the depth of the subtree, its root counted.
-    int emit_subtree(const Slot& slot, std::uint32_t place, Size& cursor) {
+    int emit_subtree(const Slot& slot, std::size_t place, Size& cursor) {
         const Treelet treelet = gather_treelet(tree_, slot.split);
-        std::array<std::uint32_t, node_width> children{};
+        Children children{};
+        std::size_t child_node = cursor.nodes;
         for (int i = 0; i < treelet.count; ++i) {
             const Slot& child = treelet.slots[static_cast<std::size_t>(i)];
-            children[static_cast<std::size_t>(i)] = child.leaf ? write_leaf(child, cursor) : cursor.nodes++;
+            children[static_cast<std::size_t>(i)] = child.leaf ? write_leaf(child, cursor) : node_child(cursor.nodes++);
         }
         write_node(nodes_[place], treelet, children);
         int deepest = 0;
         for (int i = 0; i < treelet.count; ++i) {
             const Slot& child = treelet.slots[static_cast<std::size_t>(i)];
-            if (!child.leaf) deepest = std::max(deepest, emit_subtree(child, children[static_cast<std::size_t>(i)], cursor));
+            if (!child.leaf) deepest = std::max(deepest, emit_subtree(child, child_node++, cursor));
         }
         return deepest + 1;
     }
@@ -160,7 +173,7 @@ private:
         return box;
     }
 
-    void write_node(Node& node, const Treelet& treelet, const std::array<std::uint32_t, node_width>& children) const {
+    void write_node(Node& node, const Treelet& treelet, const Children& children) const {
         for (int i = 0; i < node_width; ++i) {
             const bool used = i < treelet.count;
             const Box box = used ? box_of(treelet.slots[static_cast<std::size_t>(i)]) : Box{};
@@ -182,7 +195,7 @@ private:
     }
 
     std::uint32_t write_leaf(const Slot& slot, Size& cursor) const {
-        const std::uint32_t first = cursor.blocks;
+        const std::size_t first = cursor.blocks;
         std::array<std::uint32_t, block_width * max_leaf_blocks> prims;
         const std::uint32_t count = slot.end - slot.begin;
         for (std::uint32_t i = 0; i < count; ++i) prims[i] = tree_.refs[slot.begin + i].prim();
@@ -193,7 +206,7 @@ private:
             for (std::uint32_t k = 0; k < std::min<std::uint32_t>(block_width, count - i); ++k)
                 write_triangle(block, k, prims[i + k]);
         }
-        return leaf_child(first, cursor.blocks - first);
+        return block_child(first, cursor.blocks - first);
     }
 
     static void clear_block(TriangleBlock& block) {
@@ -222,6 +235,7 @@ private:
     const std::array<float, 3>& center_;
     Node* nodes_ = nullptr;
     TriangleBlock* blocks_ = nullptr;
+    std::size_t first_block_unit_ = 0;
 };
 
 }  // namespace
@@ -249,11 +263,15 @@ Bvh::Bvh(const Mesh& mesh, const BuildOptions& options) : accuracy_(options.accu
                                      -plane_below(bounds_[0][axis], center_[axis]));
         }
     }
-    Emitter(tree, mesh, options, center_).emit(threads, nodes_, blocks_, depth_);
+    Emitter::Result result = Emitter(tree, mesh, options, center_).emit(threads);
+    units_ = std::move(result.units);
+    node_count_ = result.size.nodes;
+    block_count_ = result.size.blocks;
+    depth_ = result.depth;
 }
 
 BvhView Bvh::view() const {
-    return {nodes_.data(), blocks_.data(), {center_[0], center_[1], center_[2]}, {extent_[0], extent_[1], extent_[2]}};
+    return {units_.data(), {center_[0], center_[1], center_[2]}, {extent_[0], extent_[1], extent_[2]}};
 }
 
 Bvh::Sah Bvh::sah() const {
@@ -268,10 +286,10 @@ Bvh::Sah Bvh::sah() const {
     const double root = d[0] * d[1] + d[1] * d[2] + d[2] * d[0];
     if (!(root > 0 && root < std::numeric_limits<double>::infinity())) return {0, 0};
     Sah sah = {1, 0};
-    for (std::size_t i = 0; i < nodes_.size(); ++i)
+    for (const Node& node : nodes())
         for (int lane = 0; lane < node_width; ++lane) {
-            const std::uint32_t child = nodes_[i].child[lane];
-            const double area = half_area(nodes_[i], lane) / root;
+            const std::uint32_t child = node.child[lane];
+            const double area = half_area(node, lane) / root;
             if (is_inner(child))
                 sah.nodes += area;
             else

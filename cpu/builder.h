@@ -2,6 +2,8 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
+#include <span>
 
 #include "large_array.h"
 #include "layout.h"
@@ -22,8 +24,11 @@ public:
     Bvh(const Mesh& mesh, const BuildOptions& options);
 
     BvhView view() const;
-    const LargeArray<Node>& nodes() const { return nodes_; }
-    const LargeArray<TriangleBlock>& blocks() const { return blocks_; }
+    std::size_t bytes() const { return units_.size(); }
+    std::span<const Node> nodes() const { return {reinterpret_cast<const Node*>(units_.data()), node_count_}; }
+    std::span<const TriangleBlock> blocks() const {
+        return {reinterpret_cast<const TriangleBlock*>(units_.data() + node_count_ * sizeof(Node)), block_count_};
+    }
     Accuracy accuracy() const { return accuracy_; }
     int depth() const { return depth_; }
     std::array<std::array<float, 3>, 2> bounds() const { return bounds_; }
@@ -35,8 +40,8 @@ public:
     Sah sah() const;
 
 private:
-    LargeArray<Node> nodes_;
-    LargeArray<TriangleBlock> blocks_;
+    LargeArray<std::byte> units_;
+    std::size_t node_count_ = 0, block_count_ = 0;
     Accuracy accuracy_;
     int depth_ = 0;
     std::array<float, 3> center_{}, extent_{};

@@ -28,17 +28,23 @@ struct alignas(32) TriangleBlock {
 };
 static_assert(sizeof(TriangleBlock) == 160);
 
-// A child reference: an inner node's index, or with leaf_bit set the first block and the number of blocks.
+
+// Nodes and blocks stand in one piece of memory, first the nodes, then the blocks, counted in units of 32 bytes:
+// a node is eight units, a block five. A child reference holds the unit where the child begins, times eight; a
+// leaf sets leaf_bit and puts its number of blocks, less one, in the low three bits. So one mask and one shift lead
+// to a child of either kind.
+inline constexpr std::size_t unit_bytes = 32;
+inline constexpr std::size_t max_units = std::size_t{1} << 28;
 inline constexpr std::uint32_t leaf_bit = 0x80000000u;
 inline constexpr int max_leaf_blocks = 8;
-inline constexpr std::uint32_t max_blocks = (1u << 28) - max_leaf_blocks;
-inline constexpr std::uint32_t end_of_stack = 0xffffffffu;  // no leaf: max_blocks leaves it free
+inline constexpr std::uint32_t end_of_stack = 0xffffffffu;  // no child: max_units leaves it free
 
 constexpr bool is_inner(std::uint32_t child) { return (child & leaf_bit) == 0; }
-constexpr std::uint32_t leaf_child(std::uint32_t first_block, std::uint32_t blocks) {
-    return leaf_bit | first_block << 3 | (blocks - 1);
+constexpr std::uint32_t inner_child(std::size_t unit) { return static_cast<std::uint32_t>(unit) << 3; }
+constexpr std::uint32_t leaf_child(std::size_t unit, std::uint32_t blocks) {
+    return leaf_bit | static_cast<std::uint32_t>(unit) << 3 | (blocks - 1);
 }
-constexpr std::uint32_t leaf_first_block(std::uint32_t child) { return (child & ~leaf_bit) >> 3; }
+constexpr std::size_t child_offset(std::uint32_t child) { return std::size_t{child & 0x7ffffff8u} * (unit_bytes / 8); }
 constexpr std::uint32_t leaf_block_count(std::uint32_t child) { return (child & 7u) + 1; }
 
 // The builder never makes a tree deeper than this (see binary_tree.cpp). One visit pops one entry and pushes
@@ -50,10 +56,17 @@ enum class Accuracy { fast, watertight };
 inline constexpr int accuracy_count = 2;
 
 struct BvhView {
-    const Node* nodes;  // nodes[0] is the root, always an inner node
-    const TriangleBlock* blocks;
+    const std::byte* units;  // begins with the root, always an inner node
     float center[3];  // planes are relative to this point
     float extent[3];  // the largest |plane| on each axis
+
+    [[gnu::always_inline]] const std::byte* at(std::uint32_t child) const { return units + child_offset(child); }
+    [[gnu::always_inline]] const Node& node(std::uint32_t child) const {
+        return *reinterpret_cast<const Node*>(at(child));
+    }
+    [[gnu::always_inline]] const TriangleBlock* leaf(std::uint32_t child) const {
+        return reinterpret_cast<const TriangleBlock*>(at(child));
+    }
 };
 
 // Coordinates beyond this are refused: products of three of them must stay finite in double, of two in float.

@@ -37,21 +37,27 @@ struct Avx2 {
                                      _mm_cvtsi32_si128(static_cast<int>(shift)))) {}
     };
 
-    WIVE_INLINE static unsigned push(StackEntry* top, Order order, Float8 tnear, Float8 tfar, const std::uint32_t* child) {
-        // The comparison is put in order; from it comes the compress, which is applied to the order itself, so that
-        // one permute takes each of child and tnear to its final place.
+    // As Avx512::push.
+    WIVE_INLINE static std::uint32_t push(StackEntry*& top, Order order, Float8 tnear, Float8 tfar,
+                                          const std::uint32_t* child) {
+        const __m256i ordered = _mm256_permutevar8x32_epi32(_mm256_load_si256(reinterpret_cast<const __m256i*>(child)), order.slots);
+        alignas(64) std::uint32_t next[16];
+        next[7] = top[-1].child;
+        _mm256_store_si256(reinterpret_cast<__m256i*>(next + 8), ordered);
+
         const __m256 hits = _mm256_permutevar8x32_ps(_mm256_cmp_ps(tnear.v, tfar.v, _CMP_LE_OQ), order.slots);
         const unsigned hit = static_cast<unsigned>(_mm256_movemask_ps(hits));
         const __m256i packed = _mm256_set1_epi32(static_cast<int>(compress_table[hit]));
         const __m256i lanes = _mm256_srlv_epi32(packed, _mm256_setr_epi32(0, 4, 8, 12, 16, 20, 24, 28));
-        const __m256i slots = _mm256_permutevar8x32_epi32(order.slots, lanes);
-        const __m256i a = _mm256_permutevar8x32_epi32(_mm256_castps_si256(tnear.v), slots);
-        const __m256i c = _mm256_permutevar8x32_epi32(_mm256_load_si256(reinterpret_cast<const __m256i*>(child)), slots);
+        const __m256i a = _mm256_permutevar8x32_epi32(_mm256_castps_si256(tnear.v),
+                                                      _mm256_permutevar8x32_epi32(order.slots, lanes));
+        const __m256i c = _mm256_permutevar8x32_epi32(ordered, lanes);
         const __m256i low = _mm256_unpacklo_epi32(a, c), high = _mm256_unpackhi_epi32(a, c);
         __m256i* to = reinterpret_cast<__m256i*>(top);
         _mm256_storeu_si256(to, _mm256_permute2x128_si256(low, high, 0x20));
         _mm256_storeu_si256(to + 1, _mm256_permute2x128_si256(low, high, 0x31));
-        return static_cast<unsigned>(_mm_popcnt_u32(hit));
+        top += _mm_popcnt_u32(hit) - 1;
+        return next[7 + 31 - _lzcnt_u32(2 * hit + 1)];
     }
 };
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 
 #include "stack.h"
@@ -78,8 +79,9 @@ struct Scalar {
         WIVE_INLINE unsigned slot(int i) const { return row[i] >> shift & 7u; }
     };
 
-    WIVE_INLINE static unsigned push(StackEntry* top, Order order, const Float8& tnear, const Float8& tfar,
-                                     const std::uint32_t* child) {
+    // Stores the children that hit, in order, at `top` and beyond; returns how many.
+    WIVE_INLINE static unsigned store_hits(StackEntry* top, Order order, const Float8& tnear, const Float8& tfar,
+                                           const std::uint32_t* child) {
         unsigned count = 0;
         for (int i = 0; i < node_width; ++i) {  // always store, step on where it hit: no branch on the hit
             const unsigned slot = order.slot(i);
@@ -88,20 +90,28 @@ struct Scalar {
         }
         return count;
     }
+
+    // As Avx512::push.
+    WIVE_INLINE static std::uint32_t push(StackEntry*& top, Order order, const Float8& tnear, const Float8& tfar,
+                                          const std::uint32_t* child) {
+        top += static_cast<std::ptrdiff_t>(store_hits(top, order, tnear, tfar, child)) - 1;
+        return top->child;
+    }
 };
 
 // Scalar with the children sorted by true entry distance instead of the stored order: what sorting would buy.
 struct ScalarByDistance : Scalar {
-    WIVE_INLINE static unsigned push(StackEntry* top, Order order, const Float8& tnear, const Float8& tfar,
-                                     const std::uint32_t* child) {
-        const unsigned count = Scalar::push(top, order, tnear, tfar, child);
+    WIVE_INLINE static std::uint32_t push(StackEntry*& top, Order order, const Float8& tnear, const Float8& tfar,
+                                          const std::uint32_t* child) {
+        const unsigned count = store_hits(top, order, tnear, tfar, child);
         for (unsigned i = 1; i < count; ++i) {
             const StackEntry entry = top[i];
             unsigned place = i;
             for (; place > 0 && top[place - 1].tnear < entry.tnear; --place) top[place] = top[place - 1];
             top[place] = entry;
         }
-        return count;
+        top += static_cast<std::ptrdiff_t>(count) - 1;
+        return top->child;
     }
 };
 

@@ -28,8 +28,8 @@ struct FullSlabs {
         order_shift = 4 * (7 - ray.octant);
     }
 
-    // Pushes the children that the ray meets within [tmin, tmax], the nearest on top; returns how many.
-    [[gnu::always_inline]] unsigned visit(const Node& node, float tmax, StackEntry* top) const {
+    // Pushes the children that the ray meets within [tmin, tmax] and moves top to the nearest; returns what is there.
+    [[gnu::always_inline]] std::uint32_t visit(const Node& node, float tmax, StackEntry*& top) const {
         // (A) order
         const typename Isa::Order order{node.order, order_shift};
         // (B) slabs

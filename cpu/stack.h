@@ -15,12 +15,14 @@ struct StackEntry {
 static_assert(sizeof(StackEntry) == 8);
 
 // Room for what a tree of max_depth can leave behind, and for the unused lanes of the topmost vector store.
+//
+// `top` points at the entry that was taken last; what a node pushes overwrites it. Below all others stands an
+// entry that is always near enough to be taken, and whose child ends the traversal. It stands there twice, so that
+// one may look at the entry below the top of an empty stack.
 struct alignas(64) Stack {
-    StackEntry entries[2 + max_stack + node_width];
+    StackEntry entries[3 + max_stack + node_width];
 
-    // Below all others stands an entry that is always near enough to be popped: reaching it ends the traversal.
-    // It stands there twice, so that one may look at the entry below the top of an empty stack.
-    [[gnu::always_inline]] StackEntry* bottom() {
+    [[gnu::always_inline]] StackEntry* start() {
         entries[0] = entries[1] = {-std::numeric_limits<float>::infinity(), end_of_stack};
         return entries + 2;
     }

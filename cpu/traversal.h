@@ -35,12 +35,10 @@ struct StepCounters {
     }
 };
 
-// Starts loading what a child reference points to: a node's four cache lines, or as much of a leaf. The address is
-// an integer, because end_of_stack points nowhere; a prefetch of such an address does nothing.
+// Starts loading four cache lines of what a child reference points to: a whole node, or one block and more. The
+// address is an integer, because end_of_stack points nowhere; a prefetch of such an address does nothing.
 [[gnu::always_inline]] inline void prefetch(const BvhView& bvh, std::uint32_t child) {
-    const std::uintptr_t address =
-        is_inner(child) ? reinterpret_cast<std::uintptr_t>(bvh.nodes) + child * sizeof(Node)
-                        : reinterpret_cast<std::uintptr_t>(bvh.blocks) + leaf_first_block(child) * sizeof(TriangleBlock);
+    const std::uintptr_t address = reinterpret_cast<std::uintptr_t>(bvh.units) + child_offset(child);
     for (unsigned line = 0; line < 4; ++line) __builtin_prefetch(reinterpret_cast<const void*>(address + 64 * line));
 }
 
@@ -48,28 +46,24 @@ template <class Slabs, class Triangles, class Query, class Counters>
 [[gnu::always_inline]] inline void traverse(const BvhView& bvh, const Slabs& slabs, const Triangles& triangles,
                                             Query& query, Counters& counters) {
     Stack stack;
-    StackEntry* top = stack.bottom();
-    std::uint32_t child = 0;  // the root
-    const auto pop = [&] {
-        do --top;
-        while (top->tnear > query.tmax);
-        return top->child;
-    };
+    StackEntry* top = stack.start();
+    std::uint32_t child = inner_child(0);  // the root
     for (;;) {
         while (is_inner(child)) {
             counters.inner_node();
-            top += slabs.visit(bvh.nodes[child], query.tmax, top);
-            prefetch(bvh, top[-2].child);  // the one after next; the next is needed at once anyway
-            child = pop();
+            child = slabs.visit(bvh.node(child), query.tmax, top);
+            prefetch(bvh, top[-1].child);  // the one after next; the next is needed at once anyway
+            while (top->tnear > query.tmax) child = (--top)->child;
         }
         if (child == end_of_stack) return;
         counters.leaf();
-        const TriangleBlock* block = bvh.blocks + leaf_first_block(child);
+        const TriangleBlock* block = bvh.leaf(child);
         for (std::uint32_t i = 0; i < leaf_block_count(child); ++i) {
             counters.block(block[i]);
             if (triangles.test(block[i], query)) return;
         }
-        child = pop();
+        do child = (--top)->child;
+        while (top->tnear > query.tmax);
     }
 }
 
