@@ -27,7 +27,7 @@ struct HalfSlabs {
         order_shift = 4 * (7 - ray.octant);
     }
 
-    WIVE_INLINE std::uint32_t visit(const Node& node, float tmax, StackEntry*& top) const {
+    WIVE_INLINE std::uint32_t visit(const Node& node, float tmax, Stack::Top& top) const {
         // (A) order
         const typename Isa::Order order{node.order, order_shift};
         // (B) slabs

@@ -38,11 +38,11 @@ struct Avx2 {
     };
 
     // As Avx512::push.
-    WIVE_INLINE static std::uint32_t push(StackEntry*& top, Order order, Float8 tnear, Float8 tfar,
+    WIVE_INLINE static std::uint32_t push(Stack::Top& top, Order order, Float8 tnear, Float8 tfar,
                                           const std::uint32_t* child) {
         const __m256i ordered = _mm256_permutevar8x32_epi32(_mm256_load_si256(reinterpret_cast<const __m256i*>(child)), order.slots);
         alignas(64) std::uint32_t next[16];
-        next[7] = top[-1].child;
+        next[7] = top.child(-1);
         _mm256_store_si256(reinterpret_cast<__m256i*>(next + 8), ordered);
 
         const __m256 hits = _mm256_permutevar8x32_ps(_mm256_cmp_ps(tnear.v, tfar.v, _CMP_LE_OQ), order.slots);
@@ -52,11 +52,9 @@ struct Avx2 {
         const __m256i a = _mm256_permutevar8x32_epi32(_mm256_castps_si256(tnear.v),
                                                       _mm256_permutevar8x32_epi32(order.slots, lanes));
         const __m256i c = _mm256_permutevar8x32_epi32(ordered, lanes);
-        const __m256i low = _mm256_unpacklo_epi32(a, c), high = _mm256_unpackhi_epi32(a, c);
-        __m256i* to = reinterpret_cast<__m256i*>(top);
-        _mm256_storeu_si256(to, _mm256_permute2x128_si256(low, high, 0x20));
-        _mm256_storeu_si256(to + 1, _mm256_permute2x128_si256(low, high, 0x31));
-        top += _mm_popcnt_u32(hit) - 1;
+        _mm256_storeu_si256(reinterpret_cast<__m256i*>(&top.distance()), a);
+        _mm256_storeu_si256(reinterpret_cast<__m256i*>(&top.child()), c);
+        top.move(static_cast<std::ptrdiff_t>(_mm_popcnt_u32(hit)) - 1);
         return next[7 + 31 - _lzcnt_u32(2 * hit + 1)];
     }
 };

@@ -33,21 +33,21 @@ struct Avx512 {
     // The child would come back from the stack only after compress, store and load. It is taken the short way: the
     // ordered children are stored before the boxes are decided, behind the child now below the top, and the last lane
     // that hit picks one of them.
-    WIVE_INLINE static std::uint32_t push(StackEntry*& top, Order order, Float8 tnear, Float8 tfar,
+    WIVE_INLINE static std::uint32_t push(Stack::Top& top, Order order, Float8 tnear, Float8 tfar,
                                           const std::uint32_t* child) {
         const __m256i c = _mm256_permutevar8x32_epi32(_mm256_load_si256(reinterpret_cast<const __m256i*>(child)), order.slots);
         alignas(64) std::uint32_t next[16];
-        next[7] = top[-1].child;
+        next[7] = top.child(-1);
         _mm256_store_si256(reinterpret_cast<__m256i*>(next + 8), c);
 
         const __m256 hits = _mm256_permutevar8x32_ps(_mm256_cmp_ps(tnear.v, tfar.v, _CMP_LE_OQ), order.slots);
         const unsigned hit = static_cast<unsigned>(_mm256_movemask_ps(hits));
         const __m256 a = _mm256_permutevar8x32_ps(tnear.v, order.slots);
-        const __m512i entries = _mm512_or_si512(_mm512_cvtepu32_epi64(_mm256_castps_si256(a)),
-                                                _mm512_slli_epi64(_mm512_cvtepu32_epi64(c), 32));
-        // A compress to a register and a plain store: compressing straight to memory is microcoded on some machines.
-        _mm512_storeu_si512(top, _mm512_maskz_compress_epi64(_mm256_movepi32_mask(_mm256_castps_si256(hits)), entries));
-        top += _mm_popcnt_u32(hit) - 1;
+        // Compressed in registers and stored whole: compressing straight to memory is microcoded on some machines.
+        const __mmask8 lanes = _mm256_movepi32_mask(_mm256_castps_si256(hits));
+        _mm256_storeu_ps(&top.distance(), _mm256_maskz_compress_ps(lanes, a));
+        _mm256_storeu_si256(reinterpret_cast<__m256i*>(&top.child()), _mm256_maskz_compress_epi32(lanes, c));
+        top.move(static_cast<std::ptrdiff_t>(_mm_popcnt_u32(hit)) - 1);
         return next[7 + 31 - _lzcnt_u32(2 * hit + 1)];
     }
 };

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <utility>
 
 #include "stack.h"
 
@@ -80,38 +81,39 @@ struct Scalar {
     };
 
     // Stores the children that hit, in order, at `top` and beyond; returns how many.
-    WIVE_INLINE static unsigned store_hits(StackEntry* top, Order order, const Float8& tnear, const Float8& tfar,
+    WIVE_INLINE static unsigned store_hits(const Stack::Top& top, Order order, const Float8& tnear, const Float8& tfar,
                                            const std::uint32_t* child) {
         unsigned count = 0;
         for (int i = 0; i < node_width; ++i) {  // always store, step on where it hit: no branch on the hit
             const unsigned slot = order.slot(i);
-            top[count] = {tnear.v[slot], child[slot]};
+            top.distance(count) = tnear.v[slot];
+            top.child(count) = child[slot];
             count += tnear.v[slot] <= tfar.v[slot];
         }
         return count;
     }
 
     // As Avx512::push.
-    WIVE_INLINE static std::uint32_t push(StackEntry*& top, Order order, const Float8& tnear, const Float8& tfar,
+    WIVE_INLINE static std::uint32_t push(Stack::Top& top, Order order, const Float8& tnear, const Float8& tfar,
                                           const std::uint32_t* child) {
-        top += static_cast<std::ptrdiff_t>(store_hits(top, order, tnear, tfar, child)) - 1;
-        return top->child;
+        top.move(static_cast<std::ptrdiff_t>(store_hits(top, order, tnear, tfar, child)) - 1);
+        return top.child();
     }
 };
 
 // Scalar with the children sorted by true entry distance instead of the stored order: what sorting would buy.
 struct ScalarByDistance : Scalar {
-    WIVE_INLINE static std::uint32_t push(StackEntry*& top, Order order, const Float8& tnear, const Float8& tfar,
+    WIVE_INLINE static std::uint32_t push(Stack::Top& top, Order order, const Float8& tnear, const Float8& tfar,
                                           const std::uint32_t* child) {
         const unsigned count = store_hits(top, order, tnear, tfar, child);
         for (unsigned i = 1; i < count; ++i) {
-            const StackEntry entry = top[i];
-            unsigned place = i;
-            for (; place > 0 && top[place - 1].tnear < entry.tnear; --place) top[place] = top[place - 1];
-            top[place] = entry;
+            for (unsigned k = i; k > 0 && top.distance(k - 1) < top.distance(k); --k) {
+                std::swap(top.distance(k - 1), top.distance(k));
+                std::swap(top.child(k - 1), top.child(k));
+            }
         }
-        top += static_cast<std::ptrdiff_t>(count) - 1;
-        return top->child;
+        top.move(static_cast<std::ptrdiff_t>(count) - 1);
+        return top.child();
     }
 };
 

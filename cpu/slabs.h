@@ -29,7 +29,7 @@ struct FullSlabs {
     }
 
     // Pushes the children that the ray meets within [tmin, tmax] and moves top to the nearest; returns what is there.
-    [[gnu::always_inline]] std::uint32_t visit(const Node& node, float tmax, StackEntry*& top) const {
+    [[gnu::always_inline]] std::uint32_t visit(const Node& node, float tmax, Stack::Top& top) const {
         // (A) order
         const typename Isa::Order order{node.order, order_shift};
         // (B) slabs

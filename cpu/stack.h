@@ -1,6 +1,7 @@
 // The traversal stack: children still to visit with the distance at which the ray enters them, nearest on top.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <limits>
 
@@ -8,24 +9,34 @@
 
 namespace wive {
 
-struct StackEntry {
-    float tnear;
-    std::uint32_t child;
-};
-static_assert(sizeof(StackEntry) == 8);
-
-// Room for what a tree of max_depth can leave behind, and for the unused lanes of the topmost vector store.
+// Room for what a tree of max_depth can leave behind, and for the unused lanes of the topmost vector stores.
 //
-// `top` points at the entry that was taken last; what a node pushes overwrites it. Below all others stands an
-// entry that is always near enough to be taken, and whose child ends the traversal. It stands there twice, so that
-// one may look at the entry below the top of an empty stack.
+// `top` points at the distance of the entry that was taken last; what a node pushes overwrites it. An entry's child
+// stands a fixed way behind its distance. Below all others is an entry that is always near enough to be taken, and
+// whose child ends the traversal. It stands there twice, so that one may look at the entry below the top of an
+// empty stack.
 struct alignas(64) Stack {
-    StackEntry entries[3 + max_stack + node_width];
+    static constexpr std::ptrdiff_t size = (3 + max_stack + node_width + 15) / 16 * 16;
+    float distances[size];
+    std::uint32_t children[size];
 
-    [[gnu::always_inline]] StackEntry* start() {
-        entries[0] = entries[1] = {-std::numeric_limits<float>::infinity(), end_of_stack};
-        return entries + 2;
-    }
+    class Top {
+    public:
+        [[gnu::always_inline]] explicit Top(Stack& stack) : distance_(stack.distances + 2) {
+            for (int i = 0; i < 2; ++i) {
+                stack.distances[i] = -std::numeric_limits<float>::infinity();
+                stack.children[i] = end_of_stack;
+            }
+        }
+        [[gnu::always_inline]] float& distance(std::ptrdiff_t i = 0) const { return distance_[i]; }
+        [[gnu::always_inline]] std::uint32_t& child(std::ptrdiff_t i = 0) const {
+            return *reinterpret_cast<std::uint32_t*>(reinterpret_cast<std::byte*>(distance_ + i) + sizeof(float) * size);
+        }
+        [[gnu::always_inline]] void move(std::ptrdiff_t entries) { distance_ += entries; }
+
+    private:
+        float* distance_;
+    };
 };
 
 }  // namespace wive

@@ -46,14 +46,18 @@ template <class Slabs, class Triangles, class Query, class Counters>
 [[gnu::always_inline]] inline void traverse(const BvhView& bvh, const Slabs& slabs, const Triangles& triangles,
                                             Query& query, Counters& counters) {
     Stack stack;
-    StackEntry* top = stack.start();
+    Stack::Top top(stack);
+    const auto pop = [&] {
+        top.move(-1);
+        return top.child();
+    };
     std::uint32_t child = inner_child(0);  // the root
     for (;;) {
         while (is_inner(child)) {
             counters.inner_node();
             child = slabs.visit(bvh.node(child), query.tmax, top);
-            prefetch(bvh, top[-1].child);  // the one after next; the next is needed at once anyway
-            while (top->tnear > query.tmax) child = (--top)->child;
+            prefetch(bvh, top.child(-1));  // the one after next; the next is needed at once anyway
+            while (top.distance() > query.tmax) child = pop();
         }
         if (child == end_of_stack) return;
         counters.leaf();
@@ -62,8 +66,8 @@ template <class Slabs, class Triangles, class Query, class Counters>
             counters.block(block[i]);
             if (triangles.test(block[i], query)) return;
         }
-        do child = (--top)->child;
-        while (top->tnear > query.tmax);
+        do child = pop();
+        while (top.distance() > query.tmax);
     }
 }
 

@@ -21,9 +21,10 @@ class WatertightTriangles {
 public:
     [[gnu::always_inline]] explicit WatertightTriangles(const RayFrame<Isa>& ray) : ray_(ray) {
         const float *d = ray.direction, x = std::abs(d[0]), y = std::abs(d[1]), z = std::abs(d[2]);
-        axis_[2] = z >= x && z >= y ? 2 : (y >= x ? 1 : 0);
-        axis_[0] = axis_[2] == 2 ? 0 : axis_[2] + 1;
-        axis_[1] = axis_[0] == 2 ? 0 : axis_[0] + 1;
+        const unsigned longest = z >= x && z >= y ? 2 : (y >= x ? 1 : 0);
+        axis_[0] = longest == 2 ? 0 : longest + 1;
+        axis_[1] = longest == 0 ? 2 : longest - 1;
+        axis_[2] = longest;
         for (int k = 0; k < 2; ++k) shear_[k] = d[axis_[k]] / d[axis_[2]];
         for (int k = 0; k < 3; ++k) origin_[k] = Float4::all(ray.origin[axis_[k]]);
     }
@@ -33,10 +34,12 @@ public:
     [[gnu::always_inline]] bool test(const TriangleBlock& block, Query& query) const {
         Float4 x[3], y[3];
         const Float4 shear_x = Float4::all(shear_[0]), shear_y = Float4::all(shear_[1]);
+        const float *row_x = block.rows[axis_[0]], *row_y = block.rows[axis_[1]], *row_z = block.rows[axis_[2]];
         for (int k = 0; k < 3; ++k) {
-            const Float4 z = Float4::load(block.rows[3 * k + axis_[2]]) - origin_[2];
-            x[k] = (Float4::load(block.rows[3 * k + axis_[0]]) - origin_[0]) - shear_x * z;
-            y[k] = (Float4::load(block.rows[3 * k + axis_[1]]) - origin_[1]) - shear_y * z;
+            const int vertex = 3 * block_width * k;
+            const Float4 z = Float4::load(row_z + vertex) - origin_[2];
+            x[k] = (Float4::load(row_x + vertex) - origin_[0]) - shear_x * z;
+            y[k] = (Float4::load(row_y + vertex) - origin_[1]) - shear_y * z;
         }
         const Float4 u = x[2] * y[1] - y[2] * x[1];
         const Float4 v = x[0] * y[2] - y[0] * x[2];
@@ -78,8 +81,8 @@ private:
         const double forward = ray_.direction[axis_[2]];
         const double shear_x = ray_.direction[axis_[0]] / forward, shear_y = ray_.direction[axis_[1]] / forward;
         for (int k = 0; k < 3; ++k) {
-            const auto away = [&](int i) {
-                return static_cast<double>(block.rows[3 * k + axis_[i]][lane]) - static_cast<double>(ray_.origin[axis_[i]]);
+            const auto away = [&](std::size_t i) {
+                return static_cast<double>(block.rows[3 * k + static_cast<int>(axis_[i])][lane]) - static_cast<double>(ray_.origin[axis_[i]]);
             };
             z[k] = away(2);
             x[k] = away(0) - shear_x * z[k];
@@ -108,7 +111,7 @@ private:
     [[gnu::noinline]] void exact_edges(const TriangleBlock& block, int lane, double (&edges)[3]) const {
         double x[3], y[3];
         for (int k = 0; k < 3; ++k) {
-            const auto away = [&](int i) { return block.rows[3 * k + axis_[i]][lane] - ray_.origin[axis_[i]]; };
+            const auto away = [&](std::size_t i) { return block.rows[3 * k + static_cast<int>(axis_[i])][lane] - ray_.origin[axis_[i]]; };
             const float z = away(2);
             const float shifted_x = away(0) - shear_[0] * z, shifted_y = away(1) - shear_[1] * z;
             x[k] = shifted_x;
@@ -121,7 +124,7 @@ private:
     }
 
     const RayFrame<Isa>& ray_;
-    int axis_[3];     // the direction's longest axis last
+    std::size_t axis_[3];  // the direction's longest axis last
     float shear_[2];
     Float4 origin_[3];
 };
