@@ -271,7 +271,7 @@ Bvh::Bvh(const Mesh& mesh, const BuildOptions& options) : accuracy_(options.accu
 }
 
 BvhView Bvh::view() const {
-    return {units_.data(), {center_[0], center_[1], center_[2]}, {extent_[0], extent_[1], extent_[2]}};
+    return {units_.data(), {center_[0], center_[1], center_[2], 0}, {extent_[0], extent_[1], extent_[2], 0}};
 }
 
 Bvh::Sah Bvh::sah() const {

@@ -27,29 +27,31 @@ namespace wive {
 // 2^-29 M, which the same slack covers.
 template <class Isa>
 struct RayFrame {
-    float origin[3];
-    float direction[3];
+    using Float4 = typename Isa::Float4;
+
+    // Three values each; the fourth lane only makes them whole registers.
+    alignas(16) float origin[4];
+    alignas(16) float direction[4];
+    alignas(16) float rdir[4];
+    alignas(16) float near_bias[4];
+    alignas(16) float far_bias[4];
     float tmin, tmax;
     float scale;  // t of the caller's ray = scale * t here
-    float rdir[3];
-    float near_bias[3], far_bias[3];
     unsigned octant;  // bit a: negative on axis a, from the sign of the reciprocal
+    unsigned longest_axis;
 
     // False where the ray hits nothing by rule: an origin or a direction that is no number or out of range, a
     // direction of length zero, an empty interval.
     [[gnu::always_inline]] bool load(const BvhView& bvh, const RayBatch& rays, std::size_t i) {
-        const float* o = rays.origins + 3 * i;
-        const float* d = rays.directions + 3 * i;
+        const float *o = rays.origins + 3 * i, *d = rays.directions + 3 * i;
+        const Float4 caller_origin = Float4::set(o[0], o[1], o[2], 0), caller_direction = Float4::set(d[0], d[1], d[2], 0);
         const float caller_tmin = rays.tmin[i * rays.tmin_stride], caller_tmax = rays.tmax[i * rays.tmax_stride];
-        constexpr float largest = std::numeric_limits<float>::max();
-        bool valid = caller_tmin <= caller_tmax;
-        float longest = 0, reach = 0;
-        for (int axis = 0; axis < 3; ++axis) {
-            const float length = std::abs(d[axis]);
-            valid = valid & (std::abs(o[axis]) <= max_coordinate) & (length <= largest);
-            longest = longest < length ? length : longest;
-        }
-        if (!valid | (longest == 0)) return false;
+
+        const Float4 lengths = abs(caller_direction);
+        const unsigned in_range = less_equal(abs(caller_origin), Float4::all(max_coordinate)) &
+                                  less_equal(lengths, Float4::all(std::numeric_limits<float>::max()));
+        const float longest = highest_lane(lengths);
+        if ((in_range != 15u) | (longest == 0) | !(caller_tmin <= caller_tmax)) [[unlikely]] return false;
 
         std::uint32_t exponent = std::bit_cast<std::uint32_t>(longest) >> 23;
         exponent = exponent > 253 ? 253 : exponent;
@@ -58,26 +60,20 @@ struct RayFrame {
         tmin = caller_tmin * unscale;
         tmax = caller_tmax * unscale;
 
-        float relative[3];
-        for (int axis = 0; axis < 3; ++axis) {
-            origin[axis] = o[axis];
-            direction[axis] = d[axis] * scale;
-            relative[axis] = o[axis] - bvh.center[axis];
-            const float far = bvh.extent[axis] + std::abs(relative[axis]);
-            reach = reach < far ? far : reach;
-        }
         constexpr float smallest = 0x1p-30f, slack_factor = 0x1p-20f;
-        const float length_slack = reach * slack_factor;
-        octant = 0;
-        for (int axis = 0; axis < 3; ++axis) {
-            const float component = direction[axis];
-            rdir[axis] = 1.0f / (std::abs(component) < smallest ? std::copysign(smallest, component) : component);
-            octant |= (std::bit_cast<std::uint32_t>(rdir[axis]) >> 31) << axis;
-            const float distance = -relative[axis] * rdir[axis];
-            const float slack = std::abs(rdir[axis]) * length_slack;
-            near_bias[axis] = distance - slack;
-            far_bias[axis] = distance + slack;
-        }
+        const Float4 scaled = caller_direction * Float4::all(scale);
+        const Float4 relative = caller_origin - Float4::load(bvh.center);
+        const float reach = highest_lane(Float4::load(bvh.extent) + abs(relative));
+        const Float4 size = Float4::all(1.0f) / max(abs(scaled), Float4::all(smallest));
+        const Float4 reciprocal = flip_sign(size, scaled);
+        const Float4 distance = relative * reciprocal, slack = size * Float4::all(reach * slack_factor);
+        octant = sign_bits(scaled) & 7u;
+        longest_axis = static_cast<unsigned>(std::countr_zero(less_equal(Float4::all(longest), lengths)));
+        caller_origin.store(origin);
+        scaled.store(direction);
+        reciprocal.store(rdir);
+        (Float4::all(0.0f) - (distance + slack)).store(near_bias);
+        (slack - distance).store(far_bias);
         return true;
     }
 };

@@ -13,35 +13,36 @@ template <class Isa>
 struct HalfSlabs {
     __m512 rdir[3], bias[3];
     __m512 tmin_and_tmax;
-    unsigned near_row[3], far_row[3];
+    std::size_t near_row[3], far_row[3];  // in floats from the first plane
     unsigned order_shift;
 
     WIVE_INLINE explicit HalfSlabs(const RayFrame<Isa>& ray) : tmin_and_tmax(both(ray.tmin, -ray.tmax)) {
         for (unsigned axis = 0; axis < 3; ++axis) {
             rdir[axis] = both(ray.rdir[axis], -ray.rdir[axis]);
             bias[axis] = both(ray.near_bias[axis], -ray.far_bias[axis]);
-            const unsigned negative = ray.octant >> axis & 1u;
-            near_row[axis] = 2 * axis + negative;
-            far_row[axis] = 2 * axis + 1 - negative;
+            const std::size_t negative = ray.octant >> axis & 1u;
+            near_row[axis] = node_width * (2 * axis + negative);
+            far_row[axis] = node_width * (2 * axis + 1 - negative);
         }
         order_shift = 4 * (7 - ray.octant);
     }
 
+    template <bool with_distances>
     WIVE_INLINE std::uint32_t visit(const Node& node, float tmax, Stack::Top& top) const {
         // (A) order
         const typename Isa::Order order{node.order, order_shift};
         // (B) slabs
         const auto planes = [&](unsigned axis) {
             const __m512 near_far =
-                _mm512_insertf32x8(_mm512_castps256_ps512(_mm256_load_ps(node.planes[near_row[axis]])),
-                                   _mm256_load_ps(node.planes[far_row[axis]]), 1);
+                _mm512_insertf32x8(_mm512_castps256_ps512(_mm256_load_ps(node.planes[0] + near_row[axis])),
+                                   _mm256_load_ps(node.planes[0] + far_row[axis]), 1);
             return _mm512_fmadd_ps(near_far, rdir[axis], bias[axis]);
         };
         const __m512 interval = _mm512_mask_broadcastss_ps(tmin_and_tmax, 0xff00, _mm_set_ss(-tmax));
         const __m512 t = _mm512_max_ps(_mm512_max_ps(planes(0), planes(1)), _mm512_max_ps(planes(2), interval));
         const __m256 tfar = _mm256_xor_ps(_mm512_extractf32x8_ps(t, 1), _mm256_set1_ps(-0.0f));
         // (C) permute and compress, (D) store
-        return Isa::push(top, order, {_mm512_castps512_ps256(t)}, {tfar}, node.child);
+        return Isa::template push<with_distances>(top, order, {_mm512_castps512_ps256(t)}, {tfar}, node.child);
     }
 
 private:

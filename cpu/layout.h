@@ -57,15 +57,14 @@ inline constexpr int accuracy_count = 2;
 
 struct BvhView {
     const std::byte* units;  // begins with the root, always an inner node
-    float center[3];  // planes are relative to this point
-    float extent[3];  // the largest |plane| on each axis
+    alignas(16) float center[4];  // planes are relative to this point; the fourth lane is zero
+    alignas(16) float extent[4];  // the largest |plane| on each axis
 
-    [[gnu::always_inline]] const std::byte* at(std::uint32_t child) const { return units + child_offset(child); }
-    [[gnu::always_inline]] const Node& node(std::uint32_t child) const {
-        return *reinterpret_cast<const Node*>(at(child));
+    [[gnu::always_inline]] const Node& node(std::uint32_t child) const {  // an inner child has nothing to mask
+        return *reinterpret_cast<const Node*>(units + std::size_t{child} * (unit_bytes / 8));
     }
     [[gnu::always_inline]] const TriangleBlock* leaf(std::uint32_t child) const {
-        return reinterpret_cast<const TriangleBlock*>(at(child));
+        return reinterpret_cast<const TriangleBlock*>(units + child_offset(child));
     }
 };
 

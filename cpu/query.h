@@ -9,6 +9,8 @@ namespace wive {
 
 // The nearest hit in [tmin, tmax]; of hits at the same t, the lowest prim, whatever order they are found in.
 struct ClosestHit {
+    static constexpr bool shrinks = true;  // tmax may fall, so children already on the stack may drop out
+
     float tmin, tmax;  // tmax shrinks to the best hit
     float u = 0, v = 0;
     std::uint32_t prim = no_prim;
@@ -36,6 +38,8 @@ struct ClosestHit {
 
 // Whether anything lies in [tmin, tmax].
 struct AnyHit {
+    static constexpr bool shrinks = false;
+
     float tmin, tmax;
     bool hit = false;
 

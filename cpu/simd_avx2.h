@@ -38,6 +38,7 @@ struct Avx2 {
     };
 
     // As Avx512::push.
+    template <bool with_distances>
     WIVE_INLINE static std::uint32_t push(Stack::Top& top, Order order, Float8 tnear, Float8 tfar,
                                           const std::uint32_t* child) {
         const __m256i ordered = _mm256_permutevar8x32_epi32(_mm256_load_si256(reinterpret_cast<const __m256i*>(child)), order.slots);
@@ -49,11 +50,10 @@ struct Avx2 {
         const unsigned hit = static_cast<unsigned>(_mm256_movemask_ps(hits));
         const __m256i packed = _mm256_set1_epi32(static_cast<int>(compress_table[hit]));
         const __m256i lanes = _mm256_srlv_epi32(packed, _mm256_setr_epi32(0, 4, 8, 12, 16, 20, 24, 28));
-        const __m256i a = _mm256_permutevar8x32_epi32(_mm256_castps_si256(tnear.v),
-                                                      _mm256_permutevar8x32_epi32(order.slots, lanes));
-        const __m256i c = _mm256_permutevar8x32_epi32(ordered, lanes);
-        _mm256_storeu_si256(reinterpret_cast<__m256i*>(&top.distance()), a);
-        _mm256_storeu_si256(reinterpret_cast<__m256i*>(&top.child()), c);
+        if constexpr (with_distances)
+            _mm256_storeu_ps(&top.distance(),
+                             _mm256_permutevar8x32_ps(tnear.v, _mm256_permutevar8x32_epi32(order.slots, lanes)));
+        _mm256_storeu_si256(reinterpret_cast<__m256i*>(&top.child()), _mm256_permutevar8x32_epi32(ordered, lanes));
         top.move(static_cast<std::ptrdiff_t>(_mm_popcnt_u32(hit)) - 1);
         return next[7 + 31 - _lzcnt_u32(2 * hit + 1)];
     }

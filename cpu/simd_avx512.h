@@ -27,12 +27,15 @@ struct Avx512 {
                                      _mm_cvtsi32_si128(static_cast<int>(shift)))) {}
     };
 
+    // with_distances: store the distances, too, for a query that may shrink its interval.
+    //
     // Permutes the lanes into order, compresses those that hit and stores them at `top`, which moves to the nearest
     // of them, or to the entry below where none hit; returns that entry's child.
     //
     // The child would come back from the stack only after compress, store and load. It is taken the short way: the
     // ordered children are stored before the boxes are decided, behind the child now below the top, and the last lane
     // that hit picks one of them.
+    template <bool with_distances>
     WIVE_INLINE static std::uint32_t push(Stack::Top& top, Order order, Float8 tnear, Float8 tfar,
                                           const std::uint32_t* child) {
         const __m256i c = _mm256_permutevar8x32_epi32(_mm256_load_si256(reinterpret_cast<const __m256i*>(child)), order.slots);
@@ -42,10 +45,11 @@ struct Avx512 {
 
         const __m256 hits = _mm256_permutevar8x32_ps(_mm256_cmp_ps(tnear.v, tfar.v, _CMP_LE_OQ), order.slots);
         const unsigned hit = static_cast<unsigned>(_mm256_movemask_ps(hits));
-        const __m256 a = _mm256_permutevar8x32_ps(tnear.v, order.slots);
         // Compressed in registers and stored whole: compressing straight to memory is microcoded on some machines.
         const __mmask8 lanes = _mm256_movepi32_mask(_mm256_castps_si256(hits));
-        _mm256_storeu_ps(&top.distance(), _mm256_maskz_compress_ps(lanes, a));
+        if constexpr (with_distances)
+            _mm256_storeu_ps(&top.distance(),
+                             _mm256_maskz_compress_ps(lanes, _mm256_permutevar8x32_ps(tnear.v, order.slots)));
         _mm256_storeu_si256(reinterpret_cast<__m256i*>(&top.child()), _mm256_maskz_compress_epi32(lanes, c));
         top.move(static_cast<std::ptrdiff_t>(_mm_popcnt_u32(hit)) - 1);
         return next[7 + 31 - _lzcnt_u32(2 * hit + 1)];

@@ -30,6 +30,7 @@ struct ScalarFloats {
     WIVE_INLINE static ScalarFloats all(float x) {
         return each([&](int) { return x; });
     }
+    WIVE_INLINE static ScalarFloats set(float x, float y, float z, float w) { return {{x, y, z, w}}; }
     WIVE_INLINE void store(float* p) const {
         for (int i = 0; i < width; ++i) p[i] = v[i];
     }
@@ -57,6 +58,16 @@ struct ScalarFloats {
     }
     WIVE_INLINE friend ScalarFloats flip_sign(ScalarFloats a, ScalarFloats s) {
         return each([&](int i) { return std::signbit(s.v[i]) ? -a.v[i] : a.v[i]; });
+    }
+    WIVE_INLINE friend float highest_lane(ScalarFloats a) {
+        float highest = a.v[0];
+        for (int i = 1; i < width; ++i) highest = highest < a.v[i] ? a.v[i] : highest;
+        return highest;
+    }
+    WIVE_INLINE friend unsigned sign_bits(ScalarFloats a) {
+        unsigned bits = 0;
+        for (int i = 0; i < width; ++i) bits |= static_cast<unsigned>(std::signbit(a.v[i])) << i;
+        return bits;
     }
     WIVE_INLINE friend unsigned less_equal(ScalarFloats a, ScalarFloats b) {
         unsigned bits = 0;
@@ -94,6 +105,7 @@ struct Scalar {
     }
 
     // As Avx512::push.
+    template <bool with_distances>
     WIVE_INLINE static std::uint32_t push(Stack::Top& top, Order order, const Float8& tnear, const Float8& tfar,
                                           const std::uint32_t* child) {
         top.move(static_cast<std::ptrdiff_t>(store_hits(top, order, tnear, tfar, child)) - 1);
@@ -103,6 +115,7 @@ struct Scalar {
 
 // Scalar with the children sorted by true entry distance instead of the stored order: what sorting would buy.
 struct ScalarByDistance : Scalar {
+    template <bool with_distances>
     WIVE_INLINE static std::uint32_t push(Stack::Top& top, Order order, const Float8& tnear, const Float8& tfar,
                                           const std::uint32_t* child) {
         const unsigned count = store_hits(top, order, tnear, tfar, child);

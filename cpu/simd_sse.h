@@ -13,6 +13,7 @@ struct SseFloat4 {
 
     WIVE_INLINE static SseFloat4 load(const float* p) { return {_mm_load_ps(p)}; }
     WIVE_INLINE static SseFloat4 all(float x) { return {_mm_set1_ps(x)}; }
+    WIVE_INLINE static SseFloat4 set(float x, float y, float z, float w) { return {_mm_setr_ps(x, y, z, w)}; }
     WIVE_INLINE void store(float* p) const { _mm_store_ps(p, v); }
     WIVE_INLINE friend SseFloat4 operator+(SseFloat4 a, SseFloat4 b) { return {_mm_add_ps(a.v, b.v)}; }
     WIVE_INLINE friend SseFloat4 operator-(SseFloat4 a, SseFloat4 b) { return {_mm_sub_ps(a.v, b.v)}; }
@@ -25,6 +26,11 @@ struct SseFloat4 {
     WIVE_INLINE friend SseFloat4 flip_sign(SseFloat4 a, SseFloat4 s) {
         return {_mm_xor_ps(a.v, _mm_and_ps(_mm_set1_ps(-0.0f), s.v))};
     }
+    WIVE_INLINE friend float highest_lane(SseFloat4 a) {
+        const __m128 pairs = _mm_max_ps(a.v, _mm_movehl_ps(a.v, a.v));
+        return _mm_cvtss_f32(_mm_max_ss(pairs, _mm_movehdup_ps(pairs)));
+    }
+    WIVE_INLINE friend unsigned sign_bits(SseFloat4 a) { return static_cast<unsigned>(_mm_movemask_ps(a.v)); }
     // Lane masks as bits, lane 0 lowest. A comparison with NaN is false.
     WIVE_INLINE friend unsigned less_equal(SseFloat4 a, SseFloat4 b) {
         return static_cast<unsigned>(_mm_movemask_ps(_mm_cmp_ps(a.v, b.v, _CMP_LE_OQ)));

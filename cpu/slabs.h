@@ -12,7 +12,7 @@ struct FullSlabs {
     using Float8 = typename Isa::Float8;
 
     Float8 rdir[3], near_bias[3], far_bias[3], tmin;
-    unsigned near_row[3], far_row[3];
+    std::size_t near_row[3], far_row[3];  // in floats from the first plane
     unsigned order_shift;
 
     [[gnu::always_inline]] explicit FullSlabs(const RayFrame<Isa>& ray) : tmin(Float8::all(ray.tmin)) {
@@ -20,29 +20,30 @@ struct FullSlabs {
             rdir[axis] = Float8::all(ray.rdir[axis]);
             near_bias[axis] = Float8::all(ray.near_bias[axis]);
             far_bias[axis] = Float8::all(ray.far_bias[axis]);
-            const unsigned negative = ray.octant >> axis & 1u;
-            near_row[axis] = 2 * axis + negative;
-            far_row[axis] = 2 * axis + 1 - negative;
+            const std::size_t negative = ray.octant >> axis & 1u;
+            near_row[axis] = node_width * (2 * axis + negative);
+            far_row[axis] = node_width * (2 * axis + 1 - negative);
         }
         // The stack wants the farthest child first, and octant 7 - o is octant o backwards.
         order_shift = 4 * (7 - ray.octant);
     }
 
     // Pushes the children that the ray meets within [tmin, tmax] and moves top to the nearest; returns what is there.
+    template <bool with_distances>
     [[gnu::always_inline]] std::uint32_t visit(const Node& node, float tmax, Stack::Top& top) const {
         // (A) order
         const typename Isa::Order order{node.order, order_shift};
         // (B) slabs
         const auto near_plane = [&](unsigned axis) {
-            return multiply_add(Float8::load(node.planes[near_row[axis]]), rdir[axis], near_bias[axis]);
+            return multiply_add(Float8::load(node.planes[0] + near_row[axis]), rdir[axis], near_bias[axis]);
         };
         const auto far_plane = [&](unsigned axis) {
-            return multiply_add(Float8::load(node.planes[far_row[axis]]), rdir[axis], far_bias[axis]);
+            return multiply_add(Float8::load(node.planes[0] + far_row[axis]), rdir[axis], far_bias[axis]);
         };
         const Float8 tnear = max(max(near_plane(0), near_plane(1)), max(near_plane(2), tmin));
         const Float8 tfar = min(min(far_plane(0), far_plane(1)), min(far_plane(2), Float8::all(tmax)));
         // (C) permute and compress, (D) store
-        return Isa::push(top, order, tnear, tfar, node.child);
+        return Isa::template push<with_distances>(top, order, tnear, tfar, node.child);
     }
 };
 

@@ -47,17 +47,22 @@ template <class Slabs, class Triangles, class Query, class Counters>
                                             Query& query, Counters& counters) {
     Stack stack;
     Stack::Top top(stack);
-    const auto pop = [&] {
-        top.move(-1);
-        return top.child();
-    };
     std::uint32_t child = inner_child(0);  // the root
+    const auto take_next = [&] {
+        top.move(-1);
+        child = top.child();
+    };
+    // Children that have come to lie behind the best hit are passed over.
+    const auto skip_hidden = [&] {
+        if constexpr (Query::shrinks)
+            while (top.distance() > query.tmax) take_next();
+    };
     for (;;) {
         while (is_inner(child)) {
             counters.inner_node();
-            child = slabs.visit(bvh.node(child), query.tmax, top);
+            child = slabs.template visit<Query::shrinks>(bvh.node(child), query.tmax, top);
             prefetch(bvh, top.child(-1));  // the one after next; the next is needed at once anyway
-            while (top.distance() > query.tmax) child = pop();
+            skip_hidden();
         }
         if (child == end_of_stack) return;
         counters.leaf();
@@ -66,8 +71,8 @@ template <class Slabs, class Triangles, class Query, class Counters>
             counters.block(block[i]);
             if (triangles.test(block[i], query)) return;
         }
-        do child = pop();
-        while (top.distance() > query.tmax);
+        take_next();
+        skip_hidden();
     }
 }
 

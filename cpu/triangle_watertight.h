@@ -20,12 +20,11 @@ class WatertightTriangles {
 
 public:
     [[gnu::always_inline]] explicit WatertightTriangles(const RayFrame<Isa>& ray) : ray_(ray) {
-        const float *d = ray.direction, x = std::abs(d[0]), y = std::abs(d[1]), z = std::abs(d[2]);
-        const unsigned longest = z >= x && z >= y ? 2 : (y >= x ? 1 : 0);
-        axis_[0] = longest == 2 ? 0 : longest + 1;
-        axis_[1] = longest == 0 ? 2 : longest - 1;
-        axis_[2] = longest;
-        for (int k = 0; k < 2; ++k) shear_[k] = d[axis_[k]] / d[axis_[2]];
+        constexpr unsigned following = 0b001001;  // the axis after axis i, two bits each
+        axis_[2] = ray.longest_axis;
+        axis_[0] = following >> 2 * axis_[2] & 3u;
+        axis_[1] = following >> 2 * axis_[0] & 3u;
+        for (int k = 0; k < 2; ++k) shear_[k] = ray.direction[axis_[k]] / ray.direction[axis_[2]];
         for (int k = 0; k < 3; ++k) origin_[k] = Float4::all(ray.origin[axis_[k]]);
     }
 
@@ -68,31 +67,33 @@ private:
     // Few lanes come this far. Signs that rounding hid are settled, then t, u and v are computed in double and
     // rounded once. Weights are clamped to the decided signs, so t stays within the triangle.
     [[gnu::always_inline]] bool solve(const TriangleBlock& block, int lane, const float (&edges)[3][4], Point& hit) const {
-        double sign = edges[0][lane] < 0 ? -1.0 : 1.0;
+        bool negative = edges[0][lane] < 0;
         if (edges[0][lane] == 0 || edges[1][lane] == 0 || edges[2][lane] == 0) [[unlikely]] {
             double exact[3];
             exact_edges(block, lane, exact);
-            const bool negative = exact[0] < 0 || exact[1] < 0 || exact[2] < 0;
+            negative = exact[0] < 0 || exact[1] < 0 || exact[2] < 0;
             const bool positive = exact[0] > 0 || exact[1] > 0 || exact[2] > 0;
             if (negative == positive) return false;  // on both sides, or edge-on
-            sign = negative ? -1.0 : 1.0;
         }
+        // The plane across the ray, scaled by the direction's longest component to spare the divisions.
         double x[3], y[3], z[3];
         const double forward = ray_.direction[axis_[2]];
-        const double shear_x = ray_.direction[axis_[0]] / forward, shear_y = ray_.direction[axis_[1]] / forward;
+        const double shear_x = ray_.direction[axis_[0]], shear_y = ray_.direction[axis_[1]];
         for (int k = 0; k < 3; ++k) {
             const auto away = [&](std::size_t i) {
-                return static_cast<double>(block.rows[3 * k + static_cast<int>(axis_[i])][lane]) - static_cast<double>(ray_.origin[axis_[i]]);
+                return static_cast<double>(block.rows[3 * k + static_cast<int>(axis_[i])][lane]) -
+                       static_cast<double>(ray_.origin[axis_[i]]);
             };
             z[k] = away(2);
-            x[k] = away(0) - shear_x * z[k];
-            y[k] = away(1) - shear_y * z[k];
+            x[k] = away(0) * forward - shear_x * z[k];
+            y[k] = away(1) * forward - shear_y * z[k];
         }
         double weight[3], det = 0;
         for (int k = 0; k < 3; ++k) {
             const int i = (k + 2) % 3, j = (k + 1) % 3;
-            const double edge = sign * (x[i] * y[j] - y[i] * x[j]);
-            weight[k] = edge > 0 ? edge : 0;
+            const double edge = x[i] * y[j] - y[i] * x[j];
+            const double decided = negative ? -edge : edge;
+            weight[k] = decided > 0 ? decided : 0;
             det += weight[k];
         }
         if (!(det > 0)) [[unlikely]] {  // edge-on but for the rounding of the vertices: their weights, then
@@ -101,7 +102,7 @@ private:
             det = weight[0] + weight[1] + weight[2];
         }
         const double inverse = 1.0 / det;
-        hit.t = static_cast<float>((weight[0] * z[0] + weight[1] * z[1] + weight[2] * z[2]) * inverse / forward);
+        hit.t = static_cast<float>((weight[0] * z[0] + weight[1] * z[1] + weight[2] * z[2]) / (det * forward));
         hit.u = static_cast<float>(weight[1] * inverse);
         hit.v = static_cast<float>(weight[2] * inverse);
         return true;
