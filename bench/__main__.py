@@ -1,0 +1,43 @@
+"""Runs one bench: `python -m bench NAME [options]`."""
+
+import importlib
+import sys
+from pathlib import Path
+
+BENCHES = {
+    "embree": "single rays against native Embree: speed, build time, SAH, memory",
+    "order": "inner nodes, leaves and triangles per ray for four orders of visiting a node's children",
+}
+
+
+def main() -> int:
+    """Runs the bench named first on the command line; returns the exit status."""
+    _prefer_installed_wive()
+    name, *options = sys.argv[1:] or ["--help"]
+    if name not in BENCHES:
+        if name not in ("-h", "--help"):
+            print(f"bench: no bench {name!r}", file=sys.stderr)
+        print("usage: python -m bench NAME [--help | options]\n")
+        print("\n".join(f"  {known:8} {what}" for known, what in BENCHES.items()))
+        return 0 if name in ("-h", "--help") else 2
+    from bench.compiled_shim import BenchError
+
+    try:
+        importlib.import_module(f"bench.{name}").main(options)
+    except (BenchError, ImportError, OSError) as problem:
+        print(f"bench {name}: {problem}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        return 130
+    return 0
+
+
+def _prefer_installed_wive() -> None:
+    """Lets an installed wive, with its compiled core, win over the source folder that `-m` puts first."""
+    root = Path(__file__).resolve().parents[1]
+    if Path(sys.path[0]).resolve() == root:
+        sys.path.append(sys.path.pop(0))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,150 @@
+"""Single rays against native Embree 4 on the very same arrays: speed, build time, SAH cost, memory.
+
+Ours with one thread and as many rays in flight as asked (1: plain single-ray traversal), against a loop over
+rtcIntersect1 or rtcOccluded1; fast against Embree's default, watertight against its robust flag; each kernel
+against Embree held to the same instruction set. A ratio above 1 means that wive is faster. Hits are compared,
+too: `mismatches` counts rays that only one side hits.
+"""
+
+import argparse
+import sys
+from collections.abc import Sequence
+from itertools import product
+
+from bench import report
+from bench.compiled_shim import BenchError
+from bench.embree_figure import draw
+from bench.embree_race import Contender, build_rows, speed_rows, tree_row
+from bench.options import listed, numbers, scene_parser
+from bench.rays import KINDS, recorded_rays
+from bench.scenes import SceneFolder
+from bench.timing import QUICK, Effort, geometric_mean
+from wive import _cpu
+
+ACCURACIES = ("fast", "watertight")
+KERNELS = ("avx512", "avx2")
+PARTS = ("speed", "build", "tree")
+BUILD_THREADS = (1, 2)
+QUICK_RAYS = 16_384
+
+SPEED_COLUMNS = [
+    "scene", "triangles", "accuracy", "kernel", "in_flight", "rays", "count", "ratio", "low", "high",
+    "wive_mrays", "embree_mrays", "rounds", "mismatches",
+]  # fmt: skip
+MEAN_COLUMNS = ["accuracy", "kernel", "in_flight", "rays", "mean", "lowest", "lowest_scene"]
+BUILD_COLUMNS = [
+    "scene", "triangles", "accuracy", "threads", "ratio", "low", "high", "wive_seconds", "embree_seconds",
+    "rounds",
+]  # fmt: skip
+TREE_COLUMNS = [
+    "scene", "triangles", "accuracy", "sah_ratio", "wive_sah", "embree_sah", "bytes_ratio", "wive_bytes",
+    "embree_bytes", "embree_allocated", "wive_nodes", "embree_nodes", "wive_depth", "embree_depth",
+]  # fmt: skip
+
+
+def main(options: Sequence[str]) -> None:
+    """Runs the bench with command-line options."""
+    chosen = parse_options(options)
+    folder = SceneFolder(chosen.scene_dir)
+    names = folder.check(chosen.scenes)
+    contenders = [Contender(*pair) for pair in product(usable_kernels(chosen.kernels), chosen.in_flight)]
+    effort = QUICK if chosen.quick else Effort()
+    speed: list[report.Row] = []
+    build: list[report.Row] = []
+    trees: list[report.Row] = []
+    for name in names:
+        mesh = folder.load(name)
+        sets = []
+        if "speed" in chosen.parts:
+            recorded = recorded_rays(mesh)
+            sets = [
+                recorded[kind].thinned(QUICK_RAYS) if chosen.quick else recorded[kind] for kind in chosen.rays
+            ]
+        for accuracy in chosen.accuracy:
+            if "tree" in chosen.parts:
+                trees.append(tree_row(mesh, accuracy, contenders[0].isa))
+            if "build" in chosen.parts:
+                build += build_rows(mesh, accuracy, contenders[0].isa, BUILD_THREADS, effort)
+            if "speed" in chosen.parts:
+                for row in speed_rows(mesh, accuracy, contenders, sets, effort, chosen.ftz):
+                    speed.append(row)
+                    report.print_progress(row, ("scene", "accuracy", "kernel", "in_flight", "rays", "ratio"))
+
+    means = mean_rows(speed)
+    report.print_table(speed, SPEED_COLUMNS, "Speed, one thread: Embree's seconds over wive's")
+    report.print_table(means, MEAN_COLUMNS, "Speed over all scenes: geometric mean and lowest")
+    report.print_table(build, BUILD_COLUMNS, "Build, equal threads: Embree's seconds over wive's")
+    report.print_table(
+        trees, TREE_COLUMNS, "Trees, wive's over Embree's: SAH relative to the root, bytes per triangle"
+    )
+    content = {
+        "flush_denormals": chosen.ftz,
+        "intersectors": sorted({row["intersector"] for row in trees}),
+        "speed": speed,
+        "means": means,
+        "build": build,
+        "trees": trees,
+    }
+    report.save("embree", content, draw(speed) if speed else None, chosen.out, whole=is_whole(chosen))
+
+
+def mean_rows(speed: Sequence[report.Row]) -> list[report.Row]:
+    """Geometric mean and lowest ratio over scenes, per accuracy, contender and kind of rays or all kinds."""
+    keys = ("accuracy", "kernel", "in_flight")
+    rows = []
+    for key in dict.fromkeys(tuple(row[name] for name in keys) for row in speed):
+        group = [row for row in speed if tuple(row[name] for name in keys) == key]
+        kinds = list(dict.fromkeys(row["rays"] for row in group))
+        for kind in [*kinds, "all"]:
+            chosen = [row for row in group if kind in ("all", row["rays"])]
+            lowest = min(chosen, key=lambda row: float(row["ratio"]))
+            rows.append(
+                {
+                    **dict(zip(keys, key, strict=True)),
+                    "rays": kind,
+                    "mean": geometric_mean([row["ratio"] for row in chosen]),
+                    "lowest": lowest["ratio"],
+                    "lowest_scene": lowest["scene"],
+                }
+            )
+    return rows
+
+
+def usable_kernels(names: Sequence[str]) -> list[str]:
+    """Those of the kernels that this machine can run; says which it leaves out and why."""
+    known = _cpu.kernels()
+    usable = []
+    for name in names:
+        reason = known.get(name, f"there is no such kernel: {', '.join(known)}")
+        if reason:
+            print(f"leaving out kernel {name!r}: {reason}", file=sys.stderr)
+        else:
+            usable.append(name)
+    if not usable:
+        raise BenchError("none of the kernels asked for can run here")
+    return usable
+
+
+def parse_options(options: Sequence[str]) -> argparse.Namespace:
+    """The command line's choices."""
+    parser = scene_parser("embree", __doc__)
+    parser.add_argument(
+        "--kernels", type=listed(), default=KERNELS, help="wive's kernels, e.g. avx512.full,avx2"
+    )
+    parser.add_argument(
+        "--in-flight", type=numbers, default=(1,), help="rays interleaved per thread, e.g. 1,32"
+    )
+    parser.add_argument("--accuracy", type=listed(ACCURACIES), default=ACCURACIES, help=", ".join(ACCURACIES))
+    parser.add_argument("--rays", type=listed(KINDS), default=KINDS, help=", ".join(KINDS))
+    parser.add_argument("--parts", type=listed(PARTS), default=PARTS, help=", ".join(PARTS))
+    parser.add_argument(
+        "--ftz", action="store_true", help="flush denormals to zero on both sides; kept by default"
+    )
+    return parser.parse_args(options)
+
+
+def is_whole(chosen: argparse.Namespace) -> bool:
+    """Whether nothing that docs quote was left out."""
+    everything = {"kernels": KERNELS, "accuracy": ACCURACIES, "rays": KINDS, "parts": PARTS}
+    complete = all(set(getattr(chosen, name)) >= set(values) for name, values in everything.items())
+    return complete and not chosen.quick and not chosen.scenes

@@ -1,0 +1,48 @@
+"""Command-line options that benches share."""
+
+import argparse
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+
+def listed(choices: Sequence[str] = ()) -> Callable[[str], tuple[str, ...]]:
+    """A parser of names with commas between them, each among the choices where there are any."""
+
+    def names(text: str) -> tuple[str, ...]:
+        found = tuple(name.strip() for name in text.split(",") if name.strip())
+        for name in found:
+            if choices and name not in choices:
+                raise argparse.ArgumentTypeError(f"no {name!r} among {', '.join(choices)}")
+        if not found:
+            raise argparse.ArgumentTypeError("expected names with commas between them")
+        return found
+
+    return names
+
+
+def numbers(text: str) -> tuple[int, ...]:
+    """Positive integers with commas between them."""
+    try:
+        found = tuple(int(part) for part in text.split(","))
+    except ValueError:
+        found = ()
+    if not found or min(found) < 1:
+        raise argparse.ArgumentTypeError(f"expected positive integers with commas between them, got {text!r}")
+    return found
+
+
+def scene_parser(name: str, description: str | None) -> argparse.ArgumentParser:
+    """A parser with what every bench over scenes takes."""
+    summary = (description or "").split("\n")[0]
+    parser = argparse.ArgumentParser(prog=f"python -m bench {name}", description=summary)
+    parser.add_argument("--scenes", type=listed(), default=(), help="names of scenes; all by default")
+    parser.add_argument(
+        "--scene-dir", type=Path, help="folder of scenes; default $WIVE_SCENES or ../shared/scenes"
+    )
+    parser.add_argument(
+        "--quick", action="store_true", help="few rays and rounds: shows that it runs, no result"
+    )
+    parser.add_argument(
+        "--out", type=Path, help="folder for results; default bench/results, for partial runs one in ~/.cache"
+    )
+    return parser

@@ -1,0 +1,28 @@
+"""WiVe: fast ray queries on triangle meshes.
+
+>>> scene = wive.Scene(vertices, faces)
+>>> hits = scene.intersect(origins, directions)   # closest hits: t, prim, uv
+>>> shadowed = scene.occluded(origins, directions)
+
+The method is that of Fuetterling, Lojewski, Pfreundt, Hamann and Ebert, "Accelerated Single Ray
+Tracing for Wide Vector Units", High-Performance Graphics 2017.
+"""
+
+try:
+    from wive import _cpu as _cpu
+except ImportError as error:
+    raise ImportError(
+        f"wive's compiled core can't be loaded ({error}): "
+        "install with `pip install .` and don't import wive from inside its source folder"
+    ) from error
+
+from wive.backend import Backend, backends
+from wive.camera import Camera
+from wive.hits import Hits, Stats
+from wive.meshfile import load_mesh
+from wive.rendering import render
+from wive.scene import Scene, load
+
+__version__ = "0.1.0"
+
+__all__ = ["Backend", "Camera", "Hits", "Scene", "Stats", "backends", "load", "load_mesh", "render"]

@@ -1,0 +1,151 @@
+"""Checks on what users pass. Every error is one line: the argument, what was expected, what came."""
+
+import operator
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Float32 = NDArray[np.float32]
+Int32 = NDArray[np.int32]
+
+# More threads than this only cost memory; the core takes 32-bit counts.
+MOST_THREADS = 4096
+MOST_COUNT = 2**31 - 1
+
+
+def choice(name: str, value: object, allowed: Iterable[str]) -> None:
+    """Raise ValueError unless `value` is one of the allowed names."""
+    allowed = tuple(allowed)
+    if not isinstance(value, str) or value not in allowed:
+        raise ValueError(f"{name} must be one of {', '.join(allowed)} in this version of wive, got {value!r}")
+
+
+def integer(name: str, value: object, lowest: int, highest: int = MOST_COUNT) -> int:
+    """`value` as an int within [lowest, highest]."""
+    try:
+        number = operator.index(value)  # type: ignore[arg-type]
+    except TypeError:
+        raise TypeError(f"{name} must be an integer, got {_described(value)}") from None
+    if not lowest <= number <= highest:
+        raise ValueError(f"{name} must be from {lowest} to {highest}, got {number}")
+    return number
+
+
+def real(name: str, value: object) -> float:
+    """`value` as a finite float."""
+    try:
+        number = float(value)  # type: ignore[arg-type]
+    except (TypeError, ValueError):
+        raise TypeError(f"{name} must be a real number, got {_described(value)}") from None
+    if not np.isfinite(number):
+        raise ValueError(f"{name} must be finite, got {number}")
+    return number
+
+
+def vector(name: str, value: ArrayLike) -> NDArray[np.float64]:
+    """`value` as a finite float64 vector (3,)."""
+    array = _numeric(name, value, "three real numbers", "fiu")
+    if array.shape != (3,):
+        raise ValueError(f"{name} must be three real numbers, got an array of shape {array.shape}")
+    if not np.isfinite(array).all():
+        raise ValueError(f"{name} must be finite, got {array.tolist()}")
+    return array.astype(np.float64)
+
+
+def mesh(vertices: ArrayLike, faces: ArrayLike) -> tuple[Float32, Int32]:
+    """Vertices (v,3) float32 and faces (f,3) int32, C-contiguous; arrays that are so are not copied."""
+    points = _numeric("vertices", vertices, "a (v, 3) array of real numbers", "fiu")
+    if points.shape == (0,):
+        points = points.reshape(0, 3)
+    if points.ndim != 2 or points.shape[1] != 3:
+        raise ValueError(f"vertices must have shape (v, 3), got {points.shape}")
+
+    corners = _numeric("faces", faces, "an (f, 3) array of integers", "iu", "round them to integer indices")
+    if corners.shape == (0,):
+        corners = corners.reshape(0, 3)
+    if corners.ndim != 2 or corners.shape[1] != 3:
+        raise ValueError(
+            f"faces must have shape (f, 3), one row of three vertex indices a triangle, got {corners.shape}"
+        )
+    if corners.size and (corners.min() < 0 or corners.max() >= len(points)):
+        face = int(np.argmax(((corners < 0) | (corners >= len(points))).any(axis=1)))
+        raise ValueError(
+            f"faces must index the {len(points)} vertices from 0, got {corners[face].tolist()} in face {face}"
+        )
+    return _float32(points), np.require(corners, np.int32, ["C", "A"])
+
+
+def rays(
+    origins: ArrayLike, directions: ArrayLike, tmin: ArrayLike, tmax: ArrayLike
+) -> tuple[Float32, Float32, Float32, Float32]:
+    """Origins and directions (n,3) float32, tmin and tmax (1,) or (n,) float32, all C-contiguous.
+
+    A vector of shape (3,) is that of every ray.
+    """
+    origin_rows = _vectors("origins", origins)
+    direction_rows = _vectors("directions", directions)
+    if origin_rows.ndim == direction_rows.ndim == 1:
+        origin_rows, direction_rows = origin_rows[None], direction_rows[None]
+    elif origin_rows.ndim == 1:
+        origin_rows = np.tile(origin_rows, (len(direction_rows), 1))
+    elif direction_rows.ndim == 1:
+        direction_rows = np.tile(direction_rows, (len(origin_rows), 1))
+    count = len(origin_rows)
+    if len(direction_rows) != count:
+        raise ValueError(
+            f"origins and directions must be equally many, got {count} and {len(direction_rows)}"
+        )
+    return origin_rows, direction_rows, _limits("tmin", tmin, count), _limits("tmax", tmax, count)
+
+
+def threads(value: int | None, available: int) -> int:
+    """The number of threads to use: None is every core."""
+    if value is None:
+        return available
+    return min(integer("threads", value, 1), MOST_THREADS)
+
+
+def in_flight(value: int | None) -> int:
+    """Rays interleaved per thread; 0 lets the core choose."""
+    return 0 if value is None else integer("in_flight", value, 1)
+
+
+def _vectors(name: str, value: ArrayLike) -> Float32:
+    array = _numeric(name, value, "an (n, 3) array of real numbers", "fiu")
+    if array.shape == (0,):
+        array = array.reshape(0, 3)
+    if array.ndim not in (1, 2) or array.shape[-1] != 3:
+        raise ValueError(f"{name} must have shape (n, 3), or (3,) if all rays share it, got {array.shape}")
+    return _float32(array)
+
+
+def _limits(name: str, value: ArrayLike, count: int) -> Float32:
+    array = _numeric(name, value, "a real number or one per ray", "fiu")
+    if array.shape not in ((), (count,)):
+        raise ValueError(
+            f"{name} must be one number or have shape ({count},), one a ray, got shape {array.shape}"
+        )
+    return _float32(array.reshape(-1))
+
+
+def _numeric(
+    name: str, value: ArrayLike, expected: str, kinds: Sequence[str], mend: str = "convert it first"
+) -> NDArray[Any]:
+    try:
+        array = np.asarray(value)
+    except (TypeError, ValueError):
+        raise ValueError(f"{name} must be {expected}, got rows of unequal length") from None
+    if array.dtype.kind not in kinds and array.shape != (0,):
+        raise TypeError(f"{name} must be {expected}, got dtype {array.dtype}: {mend}")
+    return array
+
+
+def _float32(array: NDArray[Any]) -> Float32:
+    with np.errstate(over="ignore"):
+        return np.require(array, np.float32, ["C", "A"])
+
+
+def _described(value: object) -> str:
+    return f"{type(value).__name__} {value!r:.60}"

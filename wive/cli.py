@@ -1,0 +1,124 @@
+"""The command line: `wive render | trace | info | backends`."""
+
+import argparse
+import sys
+from collections.abc import Sequence
+from typing import NoReturn
+
+import wive
+from wive import commands
+from wive.backend import CPU_BACKENDS
+from wive.rendering import ALBEDOS, Settings
+
+BAD_INPUT = 2
+INTERRUPTED = 130
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command in `argv` (default: the program's arguments) and return its exit status.
+
+    0 is success, 2 bad input or usage (one line on stderr), 130 Ctrl-C.
+    """
+    try:
+        options = _parser().parse_args(argv)
+        options.run(options)
+    except KeyboardInterrupt:
+        print("wive: interrupted", file=sys.stderr)
+        return INTERRUPTED
+    except (ImportError, MemoryError, OSError, TypeError, ValueError) as error:
+        print(f"wive: error: {' '.join(str(error).split()) or 'out of memory'}", file=sys.stderr)
+        return BAD_INPUT
+    return 0
+
+
+class _Parser(argparse.ArgumentParser):
+    """A parser whose errors are one line."""
+
+    def error(self, message: str) -> NoReturn:
+        self.exit(BAD_INPUT, f"wive: error: {message} (see {self.prog} --help)\n")
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = _Parser(prog="wive", description="Fast ray queries on triangle meshes.")
+    parser.add_argument("--version", action="version", version=f"wive {wive.__version__}")
+    subparsers = parser.add_subparsers(required=True, metavar="COMMAND", parser_class=_Parser)
+    _add_render(subparsers)
+    _add_trace(subparsers)
+    _add_info(subparsers)
+    backends = subparsers.add_parser("backends", help="list the backends and which can run here")
+    backends.set_defaults(run=commands.list_backends)
+    return parser
+
+
+def _add_render(subparsers: "argparse._SubParsersAction[_Parser]") -> None:
+    parser = subparsers.add_parser(
+        "render",
+        help="path-trace a picture of a mesh",
+        description="Path-trace a picture of a mesh: diffuse surfaces under a white sky.",
+        formatter_class=argparse.ArgumentDefaultsHelpFormatter,
+    )
+    parser.add_argument("mesh", nargs="?", metavar="MESH", help="mesh file; default: real terrain")
+    parser.add_argument("-o", "--output", default="wive.png", metavar="PNG", help="picture to write")
+    parser.add_argument("--width", type=int, default=Settings.width, help="pixels")
+    parser.add_argument("--height", type=int, default=Settings.height, help="pixels")
+    parser.add_argument("--spp", type=int, default=Settings.spp, help="samples per pixel")
+    parser.add_argument(
+        "--bounces", type=int, default=Settings.bounces, help="diffuse bounces after which a path ends"
+    )
+    parser.add_argument(
+        "--albedo", choices=ALBEDOS, help="surface colour; default: gray, and normals for the terrain"
+    )
+    for name, meaning in (
+        ("eye", "where the camera is"),
+        ("target", "what is in the picture's middle"),
+        ("up", "what is up in the picture"),
+    ):
+        parser.add_argument(
+            f"--{name}",
+            type=float,
+            nargs=3,
+            metavar=("X", "Y", "Z"),
+            help=f"{meaning}; default: frames the mesh",
+        )
+    parser.add_argument("--fov", type=float, help="vertical field of view in degrees; default: 40")
+    parser.add_argument("--seed", type=int, default=Settings.seed, help="of the random numbers")
+    _add_scene_options(parser)
+    parser.set_defaults(run=commands.render_picture)
+
+
+def _add_trace(subparsers: "argparse._SubParsersAction[_Parser]") -> None:
+    parser = subparsers.add_parser(
+        "trace",
+        help="closest hits of rays from a file",
+        description="Find the closest hit of each ray; write arrays t, prim and uv.",
+        formatter_class=argparse.ArgumentDefaultsHelpFormatter,
+    )
+    parser.add_argument("mesh", metavar="MESH", help="mesh file")
+    parser.add_argument(
+        "rays",
+        metavar="RAYS",
+        help=".npy of shape (n,6): origin, direction; or (n,8): with tmin, tmax; "
+        "or .npz of origins, directions and maybe tmin, tmax",
+    )
+    parser.add_argument("-o", "--output", required=True, metavar="NPZ", help="hits to write")
+    _add_scene_options(parser)
+    parser.set_defaults(run=commands.trace_rays)
+
+
+def _add_info(subparsers: "argparse._SubParsersAction[_Parser]") -> None:
+    parser = subparsers.add_parser(
+        "info",
+        help="a mesh and its tree in numbers",
+        formatter_class=argparse.ArgumentDefaultsHelpFormatter,
+    )
+    parser.add_argument("mesh", metavar="MESH", help="mesh file")
+    _add_scene_options(parser, threads=False)
+    parser.set_defaults(run=commands.describe_mesh)
+
+
+def _add_scene_options(parser: argparse.ArgumentParser, threads: bool = True) -> None:
+    parser.add_argument("--backend", default="auto", help=f"auto, {', '.join(CPU_BACKENDS)}")
+    parser.add_argument("--device", help="for backends with devices; CPU backends have none")
+    parser.add_argument("--accuracy", default="watertight", help="fast or watertight")
+    if threads:
+        parser.add_argument("--threads", type=int, help="default: every core")

@@ -1,0 +1,76 @@
+"""What queries return: hits, and counters of the work behind them."""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+class Stats(NamedTuple):
+    """What each ray did, three (n,) int32 arrays: inner nodes visited, leaves visited, triangles tested."""
+
+    inner_nodes: NDArray[np.int32]
+    leaves: NDArray[np.int32]
+    triangles: NDArray[np.int32]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Hits:
+    """The closest hit of each of n rays.
+
+    Attributes:
+        t: (n,) float32, distance in multiples of the direction's length; inf on a miss.
+        prim: (n,) int32, row of `faces` that was hit; -1 on a miss.
+        uv: (n,2) float32, the hit point is (1-u-v) v0 + u v1 + v v2; NaN on a miss.
+        vertices: (v,3) float32 and
+        faces: (f,3) int32, the mesh that `prim` refers to.
+    """
+
+    t: NDArray[np.float32]
+    prim: NDArray[np.int32]
+    uv: NDArray[np.float32]
+    vertices: NDArray[np.float32]
+    faces: NDArray[np.int32]
+
+    @property
+    def mask(self) -> NDArray[np.bool_]:
+        """(n,) bool, true where the ray hit something."""
+        return self.prim >= 0
+
+    def points(self) -> NDArray[np.float64]:
+        """(n,3) float64 hit points from the barycentrics; NaN on a miss.
+
+        Computed at each call, in float64: rounding to float32 would move points off triangles that lie far
+        from the origin.
+        """
+        hit = self.mask
+        v0, v1, v2 = self._corners(hit)
+        u, v = self.uv[hit].astype(np.float64).T[:, :, None]
+        points = np.full((len(self), 3), np.nan)
+        points[hit] = (1 - u - v) * v0 + u * v1 + v * v2
+        return points
+
+    def normals(self) -> NDArray[np.float64]:
+        """(n,3) float64 unit normals of the triangles hit, by the right-hand winding; NaN on a miss.
+
+        Computed at each call. The normal is the triangle's, whichever side the ray came from.
+        """
+        hit = self.mask
+        v0, v1, v2 = self._corners(hit)
+        across = np.cross(v1 - v0, v2 - v0)
+        normals = np.full((len(self), 3), np.nan)
+        normals[hit] = across / np.linalg.norm(across, axis=1, keepdims=True)
+        return normals
+
+    def __len__(self) -> int:
+        """Number of rays."""
+        return len(self.t)
+
+    def __repr__(self) -> str:
+        """Number of rays and of hits."""
+        return f"Hits({len(self)} rays, {np.count_nonzero(self.mask)} hit)"
+
+    def _corners(self, hit: NDArray[np.bool_]) -> NDArray[np.float64]:
+        """(3,h,3) corners of the triangles hit."""
+        return self.vertices[self.faces[self.prim[hit]]].astype(np.float64).swapaxes(0, 1)

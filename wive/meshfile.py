@@ -1,0 +1,53 @@
+"""Meshes from files: whatever trimesh reads, and npz files of two arrays."""
+
+import os
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wive.files import PathLike
+from wive.npzfile import check_input, read_npz
+
+
+def load_mesh(path: PathLike) -> tuple[NDArray[np.floating[Any]], NDArray[np.integer[Any]]]:
+    """Vertices (v,3) and faces (f,3) of a mesh file, in the file's own order, nothing merged or dropped.
+
+    An .npz file gives its arrays `vertices` and `faces` as they are. Any other file is read by trimesh, with
+    float64 vertices; the meshes of a file that holds a scene are placed and joined.
+
+    Raises OSError where the file can't be read, ValueError where it is no mesh or has no triangles,
+    ImportError where trimesh is missing. Each message is one line that names the file.
+    """
+    name = check_input(path)
+    if name.lower().endswith(".npz"):
+        arrays = read_npz(name, "an npz file of arrays `vertices` and `faces`")
+        if not {"vertices", "faces"} <= arrays.keys():
+            found = ", ".join(sorted(arrays)) or "none"
+            raise ValueError(f"{name}: expected arrays `vertices` and `faces`, found {found}")
+        vertices, faces = arrays["vertices"], arrays["faces"]
+    else:
+        vertices, faces = _load_with_trimesh(name)
+    if faces.size == 0:
+        raise ValueError(f"{name}: has no triangles")
+    return vertices, faces
+
+
+def _load_with_trimesh(name: str) -> tuple[NDArray[Any], NDArray[Any]]:
+    try:
+        import trimesh
+    except ImportError:
+        raise ImportError(
+            f'{name}: reading mesh files needs trimesh: pip install "wive[trimesh]", or pass an .npz file'
+        ) from None
+    if os.path.getsize(name) == 0:
+        raise ValueError(f"{name}: is empty")
+    try:
+        mesh = trimesh.load(name, force="mesh", process=False)
+    except Exception as error:  # each format's loader fails on bad bytes in a way of its own
+        reason = " ".join(str(error).split()) or type(error).__name__
+        hint = '; try pip install "trimesh[easy]"' if isinstance(error, ImportError) else ""
+        raise ValueError(f"{name}: not a mesh that trimesh can read ({reason:.120}{hint})") from error
+    if not isinstance(mesh, trimesh.Trimesh):
+        raise ValueError(f"{name}: holds no triangle mesh but a {type(mesh).__name__}")
+    return np.asarray(mesh.vertices), np.asarray(mesh.faces, dtype=np.int32)

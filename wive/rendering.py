@@ -1,0 +1,135 @@
+"""Pictures: path tracing in bands of rows, and PNG files of them."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wive import arguments
+from wive.backend import available_threads
+from wive.camera import Camera
+from wive.files import PathLike, atomic_write, check_output
+from wive.progress import progress_bar
+from wive.scene import Scene
+
+Image = NDArray[np.float32]
+
+ALBEDOS = ("gray", "normals")
+# Paths per band: some tenths of a second, so that the bar moves and Ctrl-C is heard between bands.
+BAND_PATHS = 300_000
+LARGEST_SIDE = 65_536
+
+
+@dataclass(frozen=True, kw_only=True)
+class Settings:
+    """What makes a picture besides scene and camera; the fields are the arguments of `render`."""
+
+    width: int = 1280
+    height: int = 720
+    spp: int = 32
+    bounces: int = 8
+    albedo: Literal["gray", "normals"] = "gray"
+    seed: int = 0
+    threads: int | None = None
+
+    def __post_init__(self) -> None:
+        """Raise ValueError or TypeError that names a bad field."""
+        arguments.integer("width", self.width, 1, LARGEST_SIDE)
+        arguments.integer("height", self.height, 1, LARGEST_SIDE)
+        arguments.integer("spp", self.spp, 1)
+        arguments.integer("bounces", self.bounces, 0)
+        arguments.choice("albedo", self.albedo, ALBEDOS)
+        arguments.integer("seed", self.seed, 0)
+        arguments.threads(self.threads, 1)
+
+
+def render(
+    scene: Scene,
+    camera: Camera | None = None,
+    *,
+    width: int = 1280,
+    height: int = 720,
+    spp: int = 32,
+    bounces: int = 8,
+    albedo: Literal["gray", "normals"] = "gray",
+    seed: int = 0,
+    threads: int | None = None,
+    progress: bool = False,
+) -> Image:
+    """Path-trace a picture of diffuse surfaces under a white sky of radiance 1.
+
+    Arguments:
+        camera: None frames the whole scene.
+        width, height: in pixels.
+        spp: samples (paths) per pixel.
+        bounces: diffuse bounces after which a path ends.
+        albedo: "gray", or "normals" for surfaces coloured by their normal.
+        seed: another seed is another picture of the same noise level. Random numbers come from (seed, pixel,
+            sample, bounce) alone, so the picture depends on neither `threads` nor the scene's backend.
+        progress: show a progress bar on stderr (needs tqdm).
+
+    Returns (height, width, 3) float32 linear radiance, top row first. Raises ValueError that names a bad
+    argument.
+    """
+    settings = Settings(
+        width=width, height=height, spp=spp, bounces=bounces, albedo=albedo, seed=seed, threads=threads
+    )
+    return render_counted(scene, camera, settings, progress=progress)[0]
+
+
+def render_counted(
+    scene: Scene, camera: Camera | None, settings: Settings, *, progress: bool
+) -> tuple[Image, int]:
+    """The picture as `render` returns it, and how many rays were traced for it."""
+    width, height = settings.width, settings.height
+    if camera is None:
+        camera = Camera.framing(scene.bounds, aspect=width / height)
+    frame = camera.frame(width, height)
+    threads = arguments.threads(settings.threads, available_threads())
+    image = np.zeros((height, width, 3), np.float32)
+    rays = 0
+    with progress_bar(height, "row", "rendering", show=progress) as advance:
+        for begin, end in _bands(width, height, settings.spp):
+            rays += scene._bvh.render_rows(
+                scene.backend,
+                frame,
+                image,
+                begin,
+                end,
+                settings.spp,
+                settings.bounces,
+                settings.albedo,
+                settings.seed,
+                threads,
+            )
+            advance(end - begin)
+    return image, rays
+
+
+def check_png_output(path: PathLike) -> str:
+    """Raise unless `write_png` can write to `path`: call it before rendering."""
+    name = check_output(path, ".png")
+    try:
+        import PIL.Image  # noqa: F401
+    except ImportError:
+        raise ImportError('writing pictures needs Pillow: pip install "wive[render]"') from None
+    return name
+
+
+def write_png(path: PathLike, image: Image) -> None:
+    """Write linear radiance as an 8-bit sRGB PNG; values above 1 are white. The file is whole or absent."""
+    from PIL import Image as pillow
+
+    linear = np.clip(image, 0, 1)
+    # IEC 61966-2-1, the sRGB transfer function.
+    encoded = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
+    with atomic_write(path) as file:
+        pillow.fromarray((encoded * 255 + 0.5).astype(np.uint8)).save(file, format="PNG", optimize=True)
+
+
+def _bands(width: int, height: int, spp: int) -> Iterator[tuple[int, int]]:
+    rows = max(1, BAND_PATHS // (width * spp))
+    for begin in range(0, height, rows):
+        yield begin, min(begin + rows, height)
