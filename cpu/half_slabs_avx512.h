@@ -4,6 +4,7 @@
 #include "frame.h"
 #include "layout.h"
 #include "simd_avx512.h"
+#include "slabs.h"
 
 namespace wive {
 
@@ -13,16 +14,16 @@ template <class Isa>
 struct HalfSlabs {
     __m512 rdir[3], bias[3];
     __m512 tmin_and_tmax;
-    std::size_t near_row[3], far_row[3];  // in floats from the first plane
+    std::size_t near_row[3], far_row[3];  // in bytes from the node
     unsigned order_shift;
 
     WIVE_INLINE explicit HalfSlabs(const RayFrame<Isa>& ray) : tmin_and_tmax(both(ray.tmin, -ray.tmax)) {
         for (unsigned axis = 0; axis < 3; ++axis) {
             rdir[axis] = both(ray.rdir[axis], -ray.rdir[axis]);
             bias[axis] = both(ray.near_bias[axis], -ray.far_bias[axis]);
-            const std::size_t negative = ray.octant >> axis & 1u;
-            near_row[axis] = node_width * (2 * axis + negative);
-            far_row[axis] = node_width * (2 * axis + 1 - negative);
+            const std::size_t row_bytes = sizeof(Node::planes[0]), negative = ray.octant >> axis & 1u;
+            near_row[axis] = row_bytes * (2 * axis + negative);
+            far_row[axis] = row_bytes * (2 * axis + 1 - negative);
         }
         order_shift = 4 * (7 - ray.octant);
     }
@@ -34,8 +35,8 @@ struct HalfSlabs {
         // (B) slabs
         const auto planes = [&](unsigned axis) {
             const __m512 near_far =
-                _mm512_insertf32x8(_mm512_castps256_ps512(_mm256_load_ps(node.planes[0] + near_row[axis])),
-                                   _mm256_load_ps(node.planes[0] + far_row[axis]), 1);
+                _mm512_insertf32x8(_mm512_castps256_ps512(_mm256_load_ps(row(node, near_row[axis]))),
+                                   _mm256_load_ps(row(node, far_row[axis])), 1);
             return _mm512_fmadd_ps(near_far, rdir[axis], bias[axis]);
         };
         const __m512 interval = _mm512_mask_broadcastss_ps(tmin_and_tmax, 0xff00, _mm_set_ss(-tmax));

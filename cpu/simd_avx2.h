@@ -19,6 +19,7 @@ inline constexpr std::array<std::uint32_t, 256> compress_table = [] {
 
 struct Avx2 {
     using Float4 = SseFloat4;
+    using Double4 = AvxDouble4;
 
     struct Float8 {
         __m256 v;
@@ -47,15 +48,15 @@ struct Avx2 {
         _mm256_store_si256(reinterpret_cast<__m256i*>(next + 8), ordered);
 
         const __m256 hits = _mm256_permutevar8x32_ps(_mm256_cmp_ps(tnear.v, tfar.v, _CMP_LE_OQ), order.slots);
-        const unsigned hit = static_cast<unsigned>(_mm256_movemask_ps(hits));
+        const std::uint64_t hit = static_cast<unsigned>(_mm256_movemask_ps(hits));
         const __m256i packed = _mm256_set1_epi32(static_cast<int>(compress_table[hit]));
         const __m256i lanes = _mm256_srlv_epi32(packed, _mm256_setr_epi32(0, 4, 8, 12, 16, 20, 24, 28));
         if constexpr (with_distances)
             _mm256_storeu_ps(&top.distance(),
                              _mm256_permutevar8x32_ps(tnear.v, _mm256_permutevar8x32_epi32(order.slots, lanes)));
         _mm256_storeu_si256(reinterpret_cast<__m256i*>(&top.child()), _mm256_permutevar8x32_epi32(ordered, lanes));
-        top.move(static_cast<std::ptrdiff_t>(_mm_popcnt_u32(hit)) - 1);
-        return next[7 + 31 - _lzcnt_u32(2 * hit + 1)];
+        top.move(_mm_popcnt_u64(hit) - 1);
+        return next[7 + 63 - _lzcnt_u64(2 * hit + 1)];
     }
 };
 

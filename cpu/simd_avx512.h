@@ -8,6 +8,7 @@ namespace wive {
 
 struct Avx512 {
     using Float4 = SseFloat4;
+    using Double4 = AvxDouble4;
 
     struct Float8 {
         __m256 v;
@@ -38,21 +39,25 @@ struct Avx512 {
     template <bool with_distances>
     WIVE_INLINE static std::uint32_t push(Stack::Top& top, Order order, Float8 tnear, Float8 tfar,
                                           const std::uint32_t* child) {
-        const __m256i c = _mm256_permutevar8x32_epi32(_mm256_load_si256(reinterpret_cast<const __m256i*>(child)), order.slots);
-        alignas(64) std::uint32_t next[16];
-        next[7] = top.child(-1);
-        _mm256_store_si256(reinterpret_cast<__m256i*>(next + 8), c);
-
-        const __m256 hits = _mm256_permutevar8x32_ps(_mm256_cmp_ps(tnear.v, tfar.v, _CMP_LE_OQ), order.slots);
-        const unsigned hit = static_cast<unsigned>(_mm256_movemask_ps(hits));
+        const __m256 hits = _mm256_cmp_ps(tnear.v, tfar.v, _CMP_LE_OQ);
+        const unsigned count = static_cast<unsigned>(_mm_popcnt_u32(static_cast<unsigned>(_mm256_movemask_ps(hits))));
+        if (count == 0) {
+            top.move(-1);
+            return top.child();
+        }
+        alignas(32) std::uint32_t ordered[8];
+        const __m256i c = with_distances ? _mm256_permutevar8x32_epi32(_mm256_load_si256(reinterpret_cast<const __m256i*>(child)), order.slots) : _mm256_load_si256(reinterpret_cast<const __m256i*>(child));
+        _mm256_store_si256(reinterpret_cast<__m256i*>(ordered), c);
+        const __m256 ordered_hits = with_distances? _mm256_permutevar8x32_ps(hits, order.slots) : hits;
+        const unsigned hit = static_cast<unsigned>(_mm256_movemask_ps(ordered_hits));
         // Compressed in registers and stored whole: compressing straight to memory is microcoded on some machines.
-        const __mmask8 lanes = _mm256_movepi32_mask(_mm256_castps_si256(hits));
+        const __mmask8 lanes = _mm256_movepi32_mask(_mm256_castps_si256(ordered_hits));
         if constexpr (with_distances)
             _mm256_storeu_ps(&top.distance(),
                              _mm256_maskz_compress_ps(lanes, _mm256_permutevar8x32_ps(tnear.v, order.slots)));
         _mm256_storeu_si256(reinterpret_cast<__m256i*>(&top.child()), _mm256_maskz_compress_epi32(lanes, c));
-        top.move(static_cast<std::ptrdiff_t>(_mm_popcnt_u32(hit)) - 1);
-        return next[7 + 31 - _lzcnt_u32(2 * hit + 1)];
+        top.move(static_cast<std::ptrdiff_t>(count) - 1);
+        return ordered[31 - _lzcnt_u32(hit)];
     }
 };
 

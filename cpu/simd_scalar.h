@@ -14,67 +14,78 @@
 
 namespace wive {
 
-template <int width>
-struct ScalarFloats {
-    float v[width];
+template <class Number, int width>
+struct ScalarLanes {
+    Number v[width];
 
     template <class Lane>
-    WIVE_INLINE static ScalarFloats each(Lane lane) {
-        ScalarFloats r;
+    WIVE_INLINE static ScalarLanes each(Lane lane) {
+        ScalarLanes r;
         for (int i = 0; i < width; ++i) r.v[i] = lane(i);
         return r;
     }
-    WIVE_INLINE static ScalarFloats load(const float* p) {
+    WIVE_INLINE static ScalarLanes load(const Number* p) {
         return each([&](int i) { return p[i]; });
     }
-    WIVE_INLINE static ScalarFloats all(float x) {
+    WIVE_INLINE static ScalarLanes all(Number x) {
         return each([&](int) { return x; });
     }
-    WIVE_INLINE static ScalarFloats set(float x, float y, float z, float w) { return {{x, y, z, w}}; }
-    WIVE_INLINE void store(float* p) const {
+    WIVE_INLINE static ScalarLanes set(Number x, Number y, Number z, Number w) { return {{x, y, z, w}}; }
+    WIVE_INLINE void store(Number* p) const {
         for (int i = 0; i < width; ++i) p[i] = v[i];
     }
-    WIVE_INLINE friend ScalarFloats operator+(ScalarFloats a, ScalarFloats b) {
+    WIVE_INLINE friend ScalarLanes operator+(ScalarLanes a, ScalarLanes b) {
         return each([&](int i) { return a.v[i] + b.v[i]; });
     }
-    WIVE_INLINE friend ScalarFloats operator-(ScalarFloats a, ScalarFloats b) {
+    WIVE_INLINE friend ScalarLanes operator-(ScalarLanes a, ScalarLanes b) {
         return each([&](int i) { return a.v[i] - b.v[i]; });
     }
-    WIVE_INLINE friend ScalarFloats operator*(ScalarFloats a, ScalarFloats b) {
+    WIVE_INLINE friend ScalarLanes operator*(ScalarLanes a, ScalarLanes b) {
         return each([&](int i) { return a.v[i] * b.v[i]; });
     }
-    WIVE_INLINE friend ScalarFloats operator/(ScalarFloats a, ScalarFloats b) {
+    WIVE_INLINE friend ScalarLanes operator/(ScalarLanes a, ScalarLanes b) {
         return each([&](int i) { return a.v[i] / b.v[i]; });
     }
-    WIVE_INLINE friend ScalarFloats multiply_add(ScalarFloats a, ScalarFloats b, ScalarFloats c) { return a * b + c; }
-    WIVE_INLINE friend ScalarFloats min(ScalarFloats a, ScalarFloats b) {
+    WIVE_INLINE friend ScalarLanes multiply_add(ScalarLanes a, ScalarLanes b, ScalarLanes c) { return a * b + c; }
+    WIVE_INLINE friend ScalarLanes min(ScalarLanes a, ScalarLanes b) {
         return each([&](int i) { return a.v[i] < b.v[i] ? a.v[i] : b.v[i]; });
     }
-    WIVE_INLINE friend ScalarFloats max(ScalarFloats a, ScalarFloats b) {
+    WIVE_INLINE friend ScalarLanes max(ScalarLanes a, ScalarLanes b) {
         return each([&](int i) { return a.v[i] > b.v[i] ? a.v[i] : b.v[i]; });
     }
-    WIVE_INLINE friend ScalarFloats abs(ScalarFloats a) {
+    WIVE_INLINE friend ScalarLanes abs(ScalarLanes a) {
         return each([&](int i) { return std::fabs(a.v[i]); });
     }
-    WIVE_INLINE friend ScalarFloats flip_sign(ScalarFloats a, ScalarFloats s) {
+    WIVE_INLINE friend ScalarLanes flip_sign(ScalarLanes a, ScalarLanes s) {
         return each([&](int i) { return std::signbit(s.v[i]) ? -a.v[i] : a.v[i]; });
     }
-    WIVE_INLINE friend float highest_lane(ScalarFloats a) {
-        float highest = a.v[0];
+    WIVE_INLINE friend Number highest_lane(ScalarLanes a) {
+        Number highest = a.v[0];
         for (int i = 1; i < width; ++i) highest = highest < a.v[i] ? a.v[i] : highest;
         return highest;
     }
-    WIVE_INLINE friend unsigned sign_bits(ScalarFloats a) {
+    WIVE_INLINE friend unsigned sign_bits(ScalarLanes a) {
         unsigned bits = 0;
         for (int i = 0; i < width; ++i) bits |= static_cast<unsigned>(std::signbit(a.v[i])) << i;
         return bits;
     }
-    WIVE_INLINE friend unsigned less_equal(ScalarFloats a, ScalarFloats b) {
+    WIVE_INLINE friend unsigned less_equal(ScalarLanes a, ScalarLanes b) {
         unsigned bits = 0;
         for (int i = 0; i < width; ++i) bits |= static_cast<unsigned>(a.v[i] <= b.v[i]) << i;
         return bits;
     }
-    WIVE_INLINE friend unsigned one_sided(ScalarFloats low, ScalarFloats high) {
+    WIVE_INLINE friend unsigned equal(ScalarLanes a, ScalarLanes b) {
+        unsigned bits = 0;
+        for (int i = 0; i < width; ++i) bits |= static_cast<unsigned>(a.v[i] == b.v[i]) << i;
+        return bits;
+    }
+    WIVE_INLINE friend ScalarLanes<double, width> widen(ScalarLanes a) {
+        return ScalarLanes<double, width>::each([&](int i) { return static_cast<double>(a.v[i]); });
+    }
+    WIVE_INLINE static ScalarLanes narrow(ScalarLanes<double, width> a) {
+        return each([&](int i) { return static_cast<Number>(a.v[i]); });
+    }
+    WIVE_INLINE friend unsigned one_sided(ScalarLanes low, ScalarLanes high) {
         unsigned bits = 0;
         for (int i = 0; i < width; ++i) bits |= static_cast<unsigned>((low.v[i] >= 0) | (high.v[i] <= 0)) << i;
         return bits;
@@ -82,8 +93,9 @@ struct ScalarFloats {
 };
 
 struct Scalar {
-    using Float4 = ScalarFloats<4>;
-    using Float8 = ScalarFloats<8>;
+    using Float4 = ScalarLanes<float, 4>;
+    using Double4 = ScalarLanes<double, 4>;
+    using Float8 = ScalarLanes<float, 8>;
 
     struct Order {
         const std::uint32_t* row;

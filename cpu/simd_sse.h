@@ -1,4 +1,4 @@
-// Four floats in a 128-bit register, shared by the AVX2 and the AVX-512 files. Every function is always inlined,
+// Four floats, and the four doubles they widen to, shared by the AVX2 and the AVX-512 files. Every function is always inlined,
 // so no copy compiled for one instruction set can be linked into another.
 #pragma once
 
@@ -7,6 +7,23 @@
 #define WIVE_INLINE [[gnu::always_inline]] inline
 
 namespace wive {
+
+struct AvxDouble4 {
+    __m256d v;
+
+    WIVE_INLINE static AvxDouble4 all(double x) { return {_mm256_set1_pd(x)}; }
+    WIVE_INLINE friend AvxDouble4 operator+(AvxDouble4 a, AvxDouble4 b) { return {_mm256_add_pd(a.v, b.v)}; }
+    WIVE_INLINE friend AvxDouble4 operator-(AvxDouble4 a, AvxDouble4 b) { return {_mm256_sub_pd(a.v, b.v)}; }
+    WIVE_INLINE friend AvxDouble4 operator*(AvxDouble4 a, AvxDouble4 b) { return {_mm256_mul_pd(a.v, b.v)}; }
+    WIVE_INLINE friend AvxDouble4 operator/(AvxDouble4 a, AvxDouble4 b) { return {_mm256_div_pd(a.v, b.v)}; }
+    WIVE_INLINE friend AvxDouble4 max(AvxDouble4 a, AvxDouble4 b) { return {_mm256_max_pd(a.v, b.v)}; }
+    WIVE_INLINE friend AvxDouble4 flip_sign(AvxDouble4 a, AvxDouble4 s) {
+        return {_mm256_xor_pd(a.v, _mm256_and_pd(_mm256_set1_pd(-0.0), s.v))};
+    }
+    WIVE_INLINE friend unsigned less_equal(AvxDouble4 a, AvxDouble4 b) {
+        return static_cast<unsigned>(_mm256_movemask_pd(_mm256_cmp_pd(a.v, b.v, _CMP_LE_OQ)));
+    }
+};
 
 struct SseFloat4 {
     __m128 v;
@@ -26,6 +43,8 @@ struct SseFloat4 {
     WIVE_INLINE friend SseFloat4 flip_sign(SseFloat4 a, SseFloat4 s) {
         return {_mm_xor_ps(a.v, _mm_and_ps(_mm_set1_ps(-0.0f), s.v))};
     }
+    WIVE_INLINE friend AvxDouble4 widen(SseFloat4 a) { return {_mm256_cvtps_pd(a.v)}; }
+    WIVE_INLINE static SseFloat4 narrow(AvxDouble4 a) { return {_mm256_cvtpd_ps(a.v)}; }
     WIVE_INLINE friend float highest_lane(SseFloat4 a) {
         const __m128 pairs = _mm_max_ps(a.v, _mm_movehl_ps(a.v, a.v));
         return _mm_cvtss_f32(_mm_max_ss(pairs, _mm_movehdup_ps(pairs)));
@@ -34,6 +53,9 @@ struct SseFloat4 {
     // Lane masks as bits, lane 0 lowest. A comparison with NaN is false.
     WIVE_INLINE friend unsigned less_equal(SseFloat4 a, SseFloat4 b) {
         return static_cast<unsigned>(_mm_movemask_ps(_mm_cmp_ps(a.v, b.v, _CMP_LE_OQ)));
+    }
+    WIVE_INLINE friend unsigned equal(SseFloat4 a, SseFloat4 b) {
+        return static_cast<unsigned>(_mm_movemask_ps(_mm_cmp_ps(a.v, b.v, _CMP_EQ_OQ)));
     }
     // Lanes where low >= 0 or high <= 0.
     WIVE_INLINE friend unsigned one_sided(SseFloat4 low, SseFloat4 high) {

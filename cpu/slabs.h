@@ -6,13 +6,17 @@
 
 namespace wive {
 
+[[gnu::always_inline]] inline const float* row(const Node& node, std::size_t offset) {
+    return reinterpret_cast<const float*>(reinterpret_cast<const std::byte*>(&node) + offset);
+}
+
 // The paper's full form: entry and exit distances in two registers of eight lanes.
 template <class Isa>
 struct FullSlabs {
     using Float8 = typename Isa::Float8;
 
     Float8 rdir[3], near_bias[3], far_bias[3], tmin;
-    std::size_t near_row[3], far_row[3];  // in floats from the first plane
+    std::size_t near_row[3], far_row[3];  // in bytes from the node
     unsigned order_shift;
 
     [[gnu::always_inline]] explicit FullSlabs(const RayFrame<Isa>& ray) : tmin(Float8::all(ray.tmin)) {
@@ -20,9 +24,9 @@ struct FullSlabs {
             rdir[axis] = Float8::all(ray.rdir[axis]);
             near_bias[axis] = Float8::all(ray.near_bias[axis]);
             far_bias[axis] = Float8::all(ray.far_bias[axis]);
-            const std::size_t negative = ray.octant >> axis & 1u;
-            near_row[axis] = node_width * (2 * axis + negative);
-            far_row[axis] = node_width * (2 * axis + 1 - negative);
+            const std::size_t row_bytes = sizeof(Node::planes[0]), negative = ray.octant >> axis & 1u;
+            near_row[axis] = row_bytes * (2 * axis + negative);
+            far_row[axis] = row_bytes * (2 * axis + 1 - negative);
         }
         // The stack wants the farthest child first, and octant 7 - o is octant o backwards.
         order_shift = 4 * (7 - ray.octant);
@@ -35,10 +39,10 @@ struct FullSlabs {
         const typename Isa::Order order{node.order, order_shift};
         // (B) slabs
         const auto near_plane = [&](unsigned axis) {
-            return multiply_add(Float8::load(node.planes[0] + near_row[axis]), rdir[axis], near_bias[axis]);
+            return multiply_add(Float8::load(row(node, near_row[axis])), rdir[axis], near_bias[axis]);
         };
         const auto far_plane = [&](unsigned axis) {
-            return multiply_add(Float8::load(node.planes[0] + far_row[axis]), rdir[axis], far_bias[axis]);
+            return multiply_add(Float8::load(row(node, far_row[axis])), rdir[axis], far_bias[axis]);
         };
         const Float8 tnear = max(max(near_plane(0), near_plane(1)), max(near_plane(2), tmin));
         const Float8 tfar = min(min(far_plane(0), far_plane(1)), min(far_plane(2), Float8::all(tmax)));

@@ -42,9 +42,11 @@ struct StepCounters {
     for (unsigned line = 0; line < 4; ++line) __builtin_prefetch(reinterpret_cast<const void*>(address + 64 * line));
 }
 
-template <class Slabs, class Triangles, class Query, class Counters>
-[[gnu::always_inline]] inline void traverse(const BvhView& bvh, const Slabs& slabs, const Triangles& triangles,
-                                            Query& query, Counters& counters) {
+template <class Isa, template <class> class Slabs, template <class> class Triangles, class Query, class Counters>
+[[gnu::noinline]] void traverse(const BvhView& bvh, const RayFrame<Isa>& ray, Query& result, Counters& counters) {
+    const Slabs<Isa> slabs(ray);
+    const Triangles<Isa> triangles(ray);
+    Query query{ray.tmin, ray.tmax};
     Stack stack;
     Stack::Top top(stack);
     std::uint32_t child = inner_child(0);  // the root
@@ -64,16 +66,18 @@ template <class Slabs, class Triangles, class Query, class Counters>
             prefetch(bvh, top.child(-1));  // the one after next; the next is needed at once anyway
             skip_hidden();
         }
-        if (child == end_of_stack) return;
+        if (child == end_of_stack) break;
         counters.leaf();
         const TriangleBlock* block = bvh.leaf(child);
         for (std::uint32_t i = 0; i < leaf_block_count(child); ++i) {
             counters.block(block[i]);
-            if (triangles.test(block[i], query)) return;
+            if (triangles.test(block[i], query)) goto done;
         }
         take_next();
         skip_hidden();
     }
+done:
+    result = query;
 }
 
 template <class Isa, template <class> class Slabs, template <class> class Triangles, class Query, class Counters>
@@ -86,8 +90,8 @@ void trace_batch(const BvhView& bvh, const RayBatch& rays, const HitBatch& hits,
             counters.write(hits, i);
             continue;
         }
-        Query query{ray.tmin, ray.tmax};
-        traverse(bvh, Slabs<Isa>(ray), Triangles<Isa>(ray), query, counters);
+        Query query{0, 0};
+        traverse<Isa, Slabs, Triangles>(bvh, ray, query, counters);
         query.write(hits, i, ray.scale);
         counters.write(hits, i);
     }

@@ -17,6 +17,7 @@ namespace wive {
 template <class Isa>
 class WatertightTriangles {
     using Float4 = typename Isa::Float4;
+    using Double4 = typename Isa::Double4;
 
 public:
     [[gnu::always_inline]] explicit WatertightTriangles(const RayFrame<Isa>& ray) : ray_(ray) {
@@ -43,73 +44,88 @@ public:
         const Float4 u = x[2] * y[1] - y[2] * x[1];
         const Float4 v = x[0] * y[2] - y[0] * x[2];
         const Float4 w = x[1] * y[0] - y[1] * x[0];
-        unsigned lanes = one_sided(min(min(u, v), w), max(max(u, v), w));
+        const Float4 low = min(min(u, v), w), high = max(max(u, v), w), zero = Float4::all(0.0f);
+        unsigned lanes = one_sided(low, high);
         if (lanes == 0) [[likely]] return false;
-        alignas(16) float edges[3][4];
-        u.store(edges[0]);
-        v.store(edges[1]);
-        w.store(edges[2]);
+
+        Float4 side = low + zero;  // negative where the edge functions are; adding zero clears the sign of -0
+        if (const unsigned ties = lanes & (equal(u, zero) | equal(v, zero) | equal(w, zero)); ties != 0) [[unlikely]]
+            lanes = settle_ties(block, lanes, ties, side);
+
+        alignas(16) float ts[4], us[4], vs[4];
+        intersect(block, lanes, side, ts, us, vs);
         for (; lanes != 0; lanes &= lanes - 1) {
             const int lane = __builtin_ctz(lanes);
-            Point hit;
-            if (solve(block, lane, edges, hit) &&
-                query.offer(hit.t, hit.u, hit.v, static_cast<std::uint32_t>(block.prim[lane])))
-                return true;
+            if (query.offer(ts[lane], us[lane], vs[lane], static_cast<std::uint32_t>(block.prim[lane]))) return true;
         }
         return false;
     }
 
 private:
-    struct Point {
-        float t, u, v;
-    };
-
-    // Few lanes come this far. Signs that rounding hid are settled, then t, u and v are computed in double and
-    // rounded once. Weights are clamped to the decided signs, so t stays within the triangle.
-    [[gnu::always_inline]] bool solve(const TriangleBlock& block, int lane, const float (&edges)[3][4], Point& hit) const {
-        bool negative = edges[0][lane] < 0;
-        if (edges[0][lane] == 0 || edges[1][lane] == 0 || edges[2][lane] == 0) [[unlikely]] {
-            double exact[3];
-            exact_edges(block, lane, exact);
-            negative = exact[0] < 0 || exact[1] < 0 || exact[2] < 0;
-            const bool positive = exact[0] > 0 || exact[1] > 0 || exact[2] > 0;
-            if (negative == positive) return false;  // on both sides, or edge-on
-        }
-        // The plane across the ray, scaled by the direction's longest component to spare the divisions.
-        double x[3], y[3], z[3];
-        const double forward = ray_.direction[axis_[2]];
-        const double shear_x = ray_.direction[axis_[0]], shear_y = ray_.direction[axis_[1]];
+    // t, u and v in double, rounded once. The plane across the ray is scaled by the direction's longest component,
+    // which spares the divisions. Weights are clamped to the sides that were decided, so t stays within the triangle.
+    [[gnu::always_inline]] void intersect(const TriangleBlock& block, unsigned lanes, Float4 side, float (&ts)[4],
+                                          float (&us)[4], float (&vs)[4]) const {
+        const Double4 forward = Double4::all(ray_.direction[axis_[2]]);
+        const Double4 shear_x = Double4::all(ray_.direction[axis_[0]]), shear_y = Double4::all(ray_.direction[axis_[1]]);
+        Double4 x[3], y[3], z[3], weight[3];
         for (int k = 0; k < 3; ++k) {
-            const auto away = [&](std::size_t i) {
-                return static_cast<double>(block.rows[3 * k + static_cast<int>(axis_[i])][lane]) -
-                       static_cast<double>(ray_.origin[axis_[i]]);
+            const auto away = [&](int i) {
+                return widen(Float4::load(block.rows[axis_[i]] + 3 * block_width * k)) - widen(origin_[i]);
             };
             z[k] = away(2);
             x[k] = away(0) * forward - shear_x * z[k];
             y[k] = away(1) * forward - shear_y * z[k];
         }
-        double weight[3], det = 0;
+        const Double4 sides = widen(side), zero = Double4::all(0.0);
         for (int k = 0; k < 3; ++k) {
             const int i = (k + 2) % 3, j = (k + 1) % 3;
-            const double edge = x[i] * y[j] - y[i] * x[j];
-            const double decided = negative ? -edge : edge;
-            weight[k] = decided > 0 ? decided : 0;
-            det += weight[k];
+            weight[k] = max(flip_sign(x[i] * y[j] - y[i] * x[j], sides), zero);
         }
-        if (!(det > 0)) [[unlikely]] {  // edge-on but for the rounding of the vertices: their weights, then
-            exact_edges(block, lane, weight);
-            for (double& edge : weight) edge = std::abs(edge);
-            det = weight[0] + weight[1] + weight[2];
-        }
-        const double inverse = 1.0 / det;
-        hit.t = static_cast<float>((weight[0] * z[0] + weight[1] * z[1] + weight[2] * z[2]) / (det * forward));
-        hit.u = static_cast<float>(weight[1] * inverse);
-        hit.v = static_cast<float>(weight[2] * inverse);
-        return true;
+        const Double4 det = weight[0] + weight[1] + weight[2];
+        const Double4 inverse = Double4::all(1.0) / det;
+        const Double4 height = weight[0] * z[0] + weight[1] * z[1] + weight[2] * z[2];
+        Float4::narrow(height / (det * forward)).store(ts);
+        Float4::narrow(weight[1] * inverse).store(us);
+        Float4::narrow(weight[2] * inverse).store(vs);
+        if (const unsigned edge_on = lanes & less_equal(det, zero); edge_on != 0) [[unlikely]]
+            intersect_edge_on(block, edge_on, ts, us, vs);
     }
 
-    // The edge functions of the rounded corners; their signs are exact. Seldom called, so kept out of the loop.
-    [[gnu::noinline]] void exact_edges(const TriangleBlock& block, int lane, double (&edges)[3]) const {
+    // Decides the lanes in which rounding hid a sign; returns the lanes that remain.
+    [[gnu::noinline]] unsigned settle_ties(const TriangleBlock& block, unsigned lanes, unsigned ties, Float4& side) const {
+        alignas(16) float sides[4];
+        side.store(sides);
+        for (; ties != 0; ties &= ties - 1) {
+            const int lane = __builtin_ctz(ties);
+            double edges[3], z[3];
+            exact_edges(block, lane, edges, z);
+            const bool negative = edges[0] < 0 || edges[1] < 0 || edges[2] < 0;
+            const bool positive = edges[0] > 0 || edges[1] > 0 || edges[2] > 0;
+            if (negative == positive) lanes &= ~(1u << lane);  // on both sides, or edge-on
+            sides[lane] = negative ? -1.0f : 1.0f;
+        }
+        side = Float4::load(sides);
+        return lanes;
+    }
+
+    // A triangle that only the rounding of its vertices turned towards the ray: it is hit where the rounded one is.
+    [[gnu::noinline]] void intersect_edge_on(const TriangleBlock& block, unsigned lanes, float (&ts)[4], float (&us)[4],
+                                             float (&vs)[4]) const {
+        for (; lanes != 0; lanes &= lanes - 1) {
+            const int lane = __builtin_ctz(lanes);
+            double weight[3], z[3];
+            exact_edges(block, lane, weight, z);
+            const double det = weight[0] + weight[1] + weight[2];
+            const double height = weight[0] * z[0] + weight[1] * z[1] + weight[2] * z[2];
+            ts[lane] = static_cast<float>(height / (det * ray_.direction[axis_[2]]));
+            us[lane] = static_cast<float>(weight[1] / det);
+            vs[lane] = static_cast<float>(weight[2] / det);
+        }
+    }
+
+    // The edge functions of one lane's rounded corners, with exact signs, and the corners' depths.
+    [[gnu::noinline]] void exact_edges(const TriangleBlock& block, int lane, double (&edges)[3], double (&depth)[3]) const {
         double x[3], y[3];
         for (int k = 0; k < 3; ++k) {
             const auto away = [&](std::size_t i) { return block.rows[3 * k + static_cast<int>(axis_[i])][lane] - ray_.origin[axis_[i]]; };
@@ -117,6 +133,7 @@ private:
             const float shifted_x = away(0) - shear_[0] * z, shifted_y = away(1) - shear_[1] * z;
             x[k] = shifted_x;
             y[k] = shifted_y;
+            depth[k] = z;
         }
         for (int k = 0; k < 3; ++k) {
             const int i = (k + 2) % 3, j = (k + 1) % 3;
