@@ -21,6 +21,12 @@ namespace {
 template <class T>
 using Array = py::array_t<T, py::array::c_style>;
 
+#if defined(__clang__)
+constexpr const char* compiler_name = "clang " __clang_version__;
+#else
+constexpr const char* compiler_name = "gcc " __VERSION__;
+#endif
+
 // Rays to a thread at a time: large enough that handing them out costs nothing, small enough to share well.
 constexpr std::size_t rays_per_chunk = 1024;
 
@@ -176,6 +182,7 @@ py::array_t<float> copy(const std::array<float, n>& values) {
 PYBIND11_MODULE(_cpu, m, py::mod_gil_not_used()) {
     using namespace wive;
     m.doc() = "The compiled core of wive.";
+    m.attr("compiler") = compiler_name;
     m.def("kernels", [] {
         py::dict names;
         for (const auto& [name, reason] : list_kernels()) names[py::str(name)] = reason;
@@ -195,6 +202,11 @@ PYBIND11_MODULE(_cpu, m, py::mod_gil_not_used()) {
             const auto blocks = self.cast<const PyBvh&>().bvh().blocks();
             return view(self, {static_cast<py::ssize_t>(blocks.size()), 10, 4},
                         reinterpret_cast<const std::uint32_t*>(blocks.data()));
+        })
+        .def_property_readonly("units", [](py::object self) {
+            const Bvh& bvh = self.cast<const PyBvh&>().bvh();
+            return view(self, {static_cast<py::ssize_t>(bvh.bytes() / unit_bytes), 8},
+                        reinterpret_cast<const std::uint32_t*>(bvh.view().units));
         })
         .def_property_readonly("center", [](const PyBvh& self) {
             const BvhView v = self.bvh().view();

@@ -28,7 +28,7 @@ struct HalfSlabs {
         order_shift = 4 * (7 - ray.octant);
     }
 
-    template <bool with_distances>
+    template <bool in_order>
     WIVE_INLINE std::uint32_t visit(const Node& node, float tmax, Stack::Top& top) const {
         // (A) order
         const typename Isa::Order order{node.order, order_shift};
@@ -43,7 +43,7 @@ struct HalfSlabs {
         const __m512 t = _mm512_max_ps(_mm512_max_ps(planes(0), planes(1)), _mm512_max_ps(planes(2), interval));
         const __m256 tfar = _mm256_xor_ps(_mm512_extractf32x8_ps(t, 1), _mm256_set1_ps(-0.0f));
         // (C) permute and compress, (D) store
-        return Isa::template push<with_distances>(top, order, {_mm512_castps512_ps256(t)}, {tfar}, node.child);
+        return Isa::template push<in_order>(top, order, {_mm512_castps512_ps256(t)}, {tfar}, node.child);
     }
 
 private:

@@ -9,7 +9,8 @@ namespace wive {
 
 // The nearest hit in [tmin, tmax]; of hits at the same t, the lowest prim, whatever order they are found in.
 struct ClosestHit {
-    static constexpr bool shrinks = true;  // tmax may fall, so children already on the stack may drop out
+    // Children are met from front to back and kept with their distances, because tmax falls with every hit found.
+    static constexpr bool in_order = true;
 
     float tmin, tmax;  // tmax shrinks to the best hit
     float u = 0, v = 0;
@@ -38,7 +39,8 @@ struct ClosestHit {
 
 // Whether anything lies in [tmin, tmax].
 struct AnyHit {
-    static constexpr bool shrinks = false;
+    // Any hit ends the query, so children are taken as they stand: cheaper, and fewer steps as well.
+    static constexpr bool in_order = false;
 
     float tmin, tmax;
     bool hit = false;

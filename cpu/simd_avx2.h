@@ -39,24 +39,32 @@ struct Avx2 {
     };
 
     // As Avx512::push.
-    template <bool with_distances>
+    template <bool in_order>
     WIVE_INLINE static std::uint32_t push(Stack::Top& top, Order order, Float8 tnear, Float8 tfar,
                                           const std::uint32_t* child) {
-        const __m256i ordered = _mm256_permutevar8x32_epi32(_mm256_load_si256(reinterpret_cast<const __m256i*>(child)), order.slots);
-        alignas(64) std::uint32_t next[16];
-        next[7] = top.child(-1);
-        _mm256_store_si256(reinterpret_cast<__m256i*>(next + 8), ordered);
-
-        const __m256 hits = _mm256_permutevar8x32_ps(_mm256_cmp_ps(tnear.v, tfar.v, _CMP_LE_OQ), order.slots);
-        const std::uint64_t hit = static_cast<unsigned>(_mm256_movemask_ps(hits));
-        const __m256i packed = _mm256_set1_epi32(static_cast<int>(compress_table[hit]));
+        const __m256 hits_by_slot = _mm256_cmp_ps(tnear.v, tfar.v, _CMP_LE_OQ);
+        const unsigned count = static_cast<unsigned>(_mm_popcnt_u32(static_cast<unsigned>(_mm256_movemask_ps(hits_by_slot))));
+        if (count == 0) {
+            top.move(-1);
+            return top.child();
+        }
+        __m256i children = _mm256_load_si256(reinterpret_cast<const __m256i*>(child));
+        __m256 hits = hits_by_slot;
+        if constexpr (in_order) {
+            children = _mm256_permutevar8x32_epi32(children, order.slots);
+            hits = _mm256_permutevar8x32_ps(hits, order.slots);
+        }
+        alignas(32) std::uint32_t next[node_width];
+        _mm256_store_si256(reinterpret_cast<__m256i*>(next), children);
+        const unsigned mask = static_cast<unsigned>(_mm256_movemask_ps(hits));
+        const __m256i packed = _mm256_set1_epi32(static_cast<int>(compress_table[mask]));
         const __m256i lanes = _mm256_srlv_epi32(packed, _mm256_setr_epi32(0, 4, 8, 12, 16, 20, 24, 28));
-        if constexpr (with_distances)
+        if constexpr (in_order)
             _mm256_storeu_ps(&top.distance(),
                              _mm256_permutevar8x32_ps(tnear.v, _mm256_permutevar8x32_epi32(order.slots, lanes)));
-        _mm256_storeu_si256(reinterpret_cast<__m256i*>(&top.child()), _mm256_permutevar8x32_epi32(ordered, lanes));
-        top.move(_mm_popcnt_u64(hit) - 1);
-        return next[7 + 63 - _lzcnt_u64(2 * hit + 1)];
+        _mm256_storeu_si256(reinterpret_cast<__m256i*>(&top.child()), _mm256_permutevar8x32_epi32(children, lanes));
+        top.move(static_cast<std::ptrdiff_t>(count) - 1);
+        return next[31 - _lzcnt_u32(mask)];
     }
 };
 

@@ -28,36 +28,38 @@ struct Avx512 {
                                      _mm_cvtsi32_si128(static_cast<int>(shift)))) {}
     };
 
-    // with_distances: store the distances, too, for a query that may shrink its interval.
-    //
-    // Permutes the lanes into order, compresses those that hit and stores them at `top`, which moves to the nearest
-    // of them, or to the entry below where none hit; returns that entry's child.
+    // Permutes the lanes into order, compresses those that hit and stores them at `top`, which moves to the last of
+    // them, the nearest, or to the entry below where none hit; returns that entry's child.
     //
     // The child would come back from the stack only after compress, store and load. It is taken the short way: the
-    // ordered children are stored before the boxes are decided, behind the child now below the top, and the last lane
-    // that hit picks one of them.
-    template <bool with_distances>
+    // ordered children are stored before the boxes are decided, and the last lane that hit picks one of them.
+    // The one branch asks whether anything was hit at all. Without it the next child always waits for this node's
+    // boxes; with it, predicted, the processor goes on with what lies below on the stack (docs/design.md).
+    template <bool in_order>
     WIVE_INLINE static std::uint32_t push(Stack::Top& top, Order order, Float8 tnear, Float8 tfar,
                                           const std::uint32_t* child) {
-        const __m256 hits = _mm256_cmp_ps(tnear.v, tfar.v, _CMP_LE_OQ);
-        const unsigned count = static_cast<unsigned>(_mm_popcnt_u32(static_cast<unsigned>(_mm256_movemask_ps(hits))));
+        const __m256 hits_by_slot = _mm256_cmp_ps(tnear.v, tfar.v, _CMP_LE_OQ);
+        const unsigned count = static_cast<unsigned>(_mm_popcnt_u32(static_cast<unsigned>(_mm256_movemask_ps(hits_by_slot))));
         if (count == 0) {
             top.move(-1);
             return top.child();
         }
-        alignas(32) std::uint32_t ordered[8];
-        const __m256i c = with_distances ? _mm256_permutevar8x32_epi32(_mm256_load_si256(reinterpret_cast<const __m256i*>(child)), order.slots) : _mm256_load_si256(reinterpret_cast<const __m256i*>(child));
-        _mm256_store_si256(reinterpret_cast<__m256i*>(ordered), c);
-        const __m256 ordered_hits = with_distances? _mm256_permutevar8x32_ps(hits, order.slots) : hits;
-        const unsigned hit = static_cast<unsigned>(_mm256_movemask_ps(ordered_hits));
+        __m256i children = _mm256_load_si256(reinterpret_cast<const __m256i*>(child));
+        __m256 hits = hits_by_slot;
+        if constexpr (in_order) {
+            children = _mm256_permutevar8x32_epi32(children, order.slots);
+            hits = _mm256_permutevar8x32_ps(hits, order.slots);
+        }
+        alignas(32) std::uint32_t next[node_width];
+        _mm256_store_si256(reinterpret_cast<__m256i*>(next), children);
         // Compressed in registers and stored whole: compressing straight to memory is microcoded on some machines.
-        const __mmask8 lanes = _mm256_movepi32_mask(_mm256_castps_si256(ordered_hits));
-        if constexpr (with_distances)
+        const __mmask8 lanes = _mm256_movepi32_mask(_mm256_castps_si256(hits));
+        if constexpr (in_order)
             _mm256_storeu_ps(&top.distance(),
                              _mm256_maskz_compress_ps(lanes, _mm256_permutevar8x32_ps(tnear.v, order.slots)));
-        _mm256_storeu_si256(reinterpret_cast<__m256i*>(&top.child()), _mm256_maskz_compress_epi32(lanes, c));
+        _mm256_storeu_si256(reinterpret_cast<__m256i*>(&top.child()), _mm256_maskz_compress_epi32(lanes, children));
         top.move(static_cast<std::ptrdiff_t>(count) - 1);
-        return ordered[31 - _lzcnt_u32(hit)];
+        return next[31 - _lzcnt_u32(static_cast<unsigned>(_mm256_movemask_ps(hits)))];
     }
 };
 

@@ -74,6 +74,10 @@ struct ScalarLanes {
         for (int i = 0; i < width; ++i) bits |= static_cast<unsigned>(a.v[i] <= b.v[i]) << i;
         return bits;
     }
+    WIVE_INLINE friend unsigned all_less_equal(ScalarLanes a, ScalarLanes b, ScalarLanes c, ScalarLanes d, ScalarLanes e,
+                                               ScalarLanes f) {
+        return less_equal(a, b) & less_equal(c, d) & less_equal(e, f);
+    }
     WIVE_INLINE friend unsigned equal(ScalarLanes a, ScalarLanes b) {
         unsigned bits = 0;
         for (int i = 0; i < width; ++i) bits |= static_cast<unsigned>(a.v[i] == b.v[i]) << i;
@@ -103,12 +107,13 @@ struct Scalar {
         WIVE_INLINE unsigned slot(int i) const { return row[i] >> shift & 7u; }
     };
 
-    // Stores the children that hit, in order, at `top` and beyond; returns how many.
+    // Stores the children that hit at `top` and beyond; returns how many.
+    template <bool in_order>
     WIVE_INLINE static unsigned store_hits(const Stack::Top& top, Order order, const Float8& tnear, const Float8& tfar,
                                            const std::uint32_t* child) {
         unsigned count = 0;
         for (int i = 0; i < node_width; ++i) {  // always store, step on where it hit: no branch on the hit
-            const unsigned slot = order.slot(i);
+            const unsigned slot = in_order ? order.slot(i) : static_cast<unsigned>(i);
             top.distance(count) = tnear.v[slot];
             top.child(count) = child[slot];
             count += tnear.v[slot] <= tfar.v[slot];
@@ -117,20 +122,20 @@ struct Scalar {
     }
 
     // As Avx512::push.
-    template <bool with_distances>
+    template <bool in_order>
     WIVE_INLINE static std::uint32_t push(Stack::Top& top, Order order, const Float8& tnear, const Float8& tfar,
                                           const std::uint32_t* child) {
-        top.move(static_cast<std::ptrdiff_t>(store_hits(top, order, tnear, tfar, child)) - 1);
+        top.move(static_cast<std::ptrdiff_t>(store_hits<in_order>(top, order, tnear, tfar, child)) - 1);
         return top.child();
     }
 };
 
 // Scalar with the children sorted by true entry distance instead of the stored order: what sorting would buy.
 struct ScalarByDistance : Scalar {
-    template <bool with_distances>
+    template <bool in_order>
     WIVE_INLINE static std::uint32_t push(Stack::Top& top, Order order, const Float8& tnear, const Float8& tfar,
                                           const std::uint32_t* child) {
-        const unsigned count = store_hits(top, order, tnear, tfar, child);
+        const unsigned count = store_hits<in_order>(top, order, tnear, tfar, child);
         for (unsigned i = 1; i < count; ++i) {
             for (unsigned k = i; k > 0 && top.distance(k - 1) < top.distance(k); --k) {
                 std::swap(top.distance(k - 1), top.distance(k));

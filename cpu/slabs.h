@@ -33,7 +33,7 @@ struct FullSlabs {
     }
 
     // Pushes the children that the ray meets within [tmin, tmax] and moves top to the nearest; returns what is there.
-    template <bool with_distances>
+    template <bool in_order>
     [[gnu::always_inline]] std::uint32_t visit(const Node& node, float tmax, Stack::Top& top) const {
         // (A) order
         const typename Isa::Order order{node.order, order_shift};
@@ -47,7 +47,7 @@ struct FullSlabs {
         const Float8 tnear = max(max(near_plane(0), near_plane(1)), max(near_plane(2), tmin));
         const Float8 tfar = min(min(far_plane(0), far_plane(1)), min(far_plane(2), Float8::all(tmax)));
         // (C) permute and compress, (D) store
-        return Isa::template push<with_distances>(top, order, tnear, tfar, node.child);
+        return Isa::template push<in_order>(top, order, tnear, tfar, node.child);
     }
 };
 

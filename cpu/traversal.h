@@ -56,13 +56,13 @@ template <class Isa, template <class> class Slabs, template <class> class Triang
     };
     // Children that have come to lie behind the best hit are passed over.
     const auto skip_hidden = [&] {
-        if constexpr (Query::shrinks)
+        if constexpr (Query::in_order)
             while (top.distance() > query.tmax) take_next();
     };
     for (;;) {
         while (is_inner(child)) {
             counters.inner_node();
-            child = slabs.template visit<Query::shrinks>(bvh.node(child), query.tmax, top);
+            child = slabs.template visit<Query::in_order>(bvh.node(child), query.tmax, top);
             prefetch(bvh, top.child(-1));  // the one after next; the next is needed at once anyway
             skip_hidden();
         }

@@ -29,10 +29,10 @@ public:
         cross(s, e1, q);
         const Float4 det = dot(e1, p), size = abs(det), zero = Float4::all(0.0f);
         const Float4 u = flip_sign(dot(s, p), det), v = flip_sign(dot(direction_, q), det);
-        // NaN (an unused lane) fails the comparison.
-        unsigned lanes = less_equal(zero, min(min(u, v), size - (u + v)));
+        // A determinant of zero (a ray in the triangle's plane) and NaN (an unused lane) must fail: size <= 0 is
+        // asked the other way round.
+        unsigned lanes = less_equal(zero, u) & less_equal(zero, v) & less_equal(u + v, size) & ~less_equal(size, zero);
         if (lanes == 0) [[likely]] return false;
-        lanes &= ~less_equal(size, zero);  // a ray in the triangle's plane
         alignas(16) float ts[4], us[4], vs[4];
         (flip_sign(dot(e2, q), det) / size).store(ts);
         (u / size).store(us);

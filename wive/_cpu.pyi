@@ -9,6 +9,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+compiler: str  # the C++ compiler's name and version
+
 def kernels() -> dict[str, str]:
     """Every traversal kernel compiled in, best first, and why this machine can't run it ("" where it can).
 
@@ -36,6 +38,12 @@ class Bvh:
     @property
     def blocks(self) -> NDArray[np.uint32]:
         """(b,10,4) read-only view: nine float32 rows (fast: v0 e1 e2; watertight: v0 v1 v2) and the prim row."""
+    @property
+    def units(self) -> NDArray[np.uint32]:
+        """(8 m + 5 b, 8) read-only view of all of it: nodes, then blocks, in units of 32 bytes.
+
+        A child reference holds (unit << 3); a leaf sets bit 31 and its number of blocks less one in the low 3 bits.
+        """
     @property
     def center(self) -> NDArray[np.float32]:
         """(3,) the point box planes are relative to."""
