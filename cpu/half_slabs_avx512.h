@@ -28,11 +28,9 @@ struct HalfSlabs {
         order_shift = 4 * (7 - ray.octant);
     }
 
-    template <bool in_order>
-    WIVE_INLINE std::uint32_t visit(const Node& node, float tmax, Stack::Top& top) const {
-        // (A) order
-        const typename Isa::Order order{node.order, order_shift};
-        // (B) slabs
+    WIVE_INLINE typename Isa::Order order(const Node& node) const { return {node.order, order_shift}; }
+
+    WIVE_INLINE Interval<typename Isa::Float8> test(const Node& node, float tmax) const {
         const auto planes = [&](unsigned axis) {
             const __m512 near_far =
                 _mm512_insertf32x8(_mm512_castps256_ps512(_mm256_load_ps(row(node, near_row[axis]))),
@@ -41,9 +39,7 @@ struct HalfSlabs {
         };
         const __m512 interval = _mm512_mask_broadcastss_ps(tmin_and_tmax, 0xff00, _mm_set_ss(-tmax));
         const __m512 t = _mm512_max_ps(_mm512_max_ps(planes(0), planes(1)), _mm512_max_ps(planes(2), interval));
-        const __m256 tfar = _mm256_xor_ps(_mm512_extractf32x8_ps(t, 1), _mm256_set1_ps(-0.0f));
-        // (C) permute and compress, (D) store
-        return Isa::template push<in_order>(top, order, {_mm512_castps512_ps256(t)}, {tfar}, node.child);
+        return {{_mm512_castps512_ps256(t)}, {_mm256_xor_ps(_mm512_extractf32x8_ps(t, 1), _mm256_set1_ps(-0.0f))}};
     }
 
 private:

@@ -21,6 +21,8 @@ struct Avx2 {
     using Float4 = SseFloat4;
     using Double4 = AvxDouble4;
 
+    using Hits = AvxHits;
+
     struct Float8 {
         __m256 v;
 
@@ -29,6 +31,7 @@ struct Avx2 {
         WIVE_INLINE friend Float8 multiply_add(Float8 a, Float8 b, Float8 c) { return {_mm256_fmadd_ps(a.v, b.v, c.v)}; }
         WIVE_INLINE friend Float8 min(Float8 a, Float8 b) { return {_mm256_min_ps(a.v, b.v)}; }
         WIVE_INLINE friend Float8 max(Float8 a, Float8 b) { return {_mm256_max_ps(a.v, b.v)}; }
+        WIVE_INLINE friend Hits hits(Float8 tnear, Float8 tfar) { return {_mm256_cmp_ps(tnear.v, tfar.v, _CMP_LE_OQ)}; }
     };
 
     struct Order {
@@ -38,34 +41,34 @@ struct Avx2 {
                                      _mm_cvtsi32_si128(static_cast<int>(shift)))) {}
     };
 
-    // As Avx512::push.
+    // As Avx512::Lanes.
     template <bool in_order>
-    WIVE_INLINE static std::uint32_t push(Stack::Top& top, Order order, Float8 tnear, Float8 tfar,
-                                          const std::uint32_t* child) {
-        const __m256 hits_by_slot = _mm256_cmp_ps(tnear.v, tfar.v, _CMP_LE_OQ);
-        const unsigned count = static_cast<unsigned>(_mm_popcnt_u32(static_cast<unsigned>(_mm256_movemask_ps(hits_by_slot))));
-        if (count == 0) {
-            top.move(-1);
-            return top.child();
+    struct Lanes {
+        __m256i children;
+        __m256 hits, distances;
+        Order order;
+
+        WIVE_INLINE Lanes(Order in, Hits by_slot, Float8 tnear, const std::uint32_t* child)
+            : children(_mm256_load_si256(reinterpret_cast<const __m256i*>(child))),
+              hits(by_slot.v),
+              distances(tnear.v),
+              order(in) {
+            if constexpr (in_order) {
+                children = _mm256_permutevar8x32_epi32(children, order.slots);
+                hits = _mm256_permutevar8x32_ps(hits, order.slots);
+            }
         }
-        __m256i children = _mm256_load_si256(reinterpret_cast<const __m256i*>(child));
-        __m256 hits = hits_by_slot;
-        if constexpr (in_order) {
-            children = _mm256_permutevar8x32_epi32(children, order.slots);
-            hits = _mm256_permutevar8x32_ps(hits, order.slots);
+        WIVE_INLINE void compress_to(Stack::Top top) const {
+            const unsigned mask = static_cast<unsigned>(_mm256_movemask_ps(hits));
+            const __m256i packed = _mm256_set1_epi32(static_cast<int>(compress_table[mask]));
+            const __m256i lanes = _mm256_srlv_epi32(packed, _mm256_setr_epi32(0, 4, 8, 12, 16, 20, 24, 28));
+            if constexpr (in_order)
+                _mm256_storeu_ps(&top.distance(),
+                                 _mm256_permutevar8x32_ps(distances, _mm256_permutevar8x32_epi32(order.slots, lanes)));
+            _mm256_storeu_si256(reinterpret_cast<__m256i*>(&top.child()), _mm256_permutevar8x32_epi32(children, lanes));
         }
-        alignas(32) std::uint32_t next[node_width];
-        _mm256_store_si256(reinterpret_cast<__m256i*>(next), children);
-        const unsigned mask = static_cast<unsigned>(_mm256_movemask_ps(hits));
-        const __m256i packed = _mm256_set1_epi32(static_cast<int>(compress_table[mask]));
-        const __m256i lanes = _mm256_srlv_epi32(packed, _mm256_setr_epi32(0, 4, 8, 12, 16, 20, 24, 28));
-        if constexpr (in_order)
-            _mm256_storeu_ps(&top.distance(),
-                             _mm256_permutevar8x32_ps(tnear.v, _mm256_permutevar8x32_epi32(order.slots, lanes)));
-        _mm256_storeu_si256(reinterpret_cast<__m256i*>(&top.child()), _mm256_permutevar8x32_epi32(children, lanes));
-        top.move(static_cast<std::ptrdiff_t>(count) - 1);
-        return next[31 - _lzcnt_u32(mask)];
-    }
+        WIVE_INLINE std::uint32_t last_hit() const { return last_hit_child(children, hits); }
+    };
 };
 
 }  // namespace wive

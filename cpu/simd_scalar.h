@@ -96,6 +96,15 @@ struct ScalarLanes {
     }
 };
 
+// Which of eight lanes were hit.
+struct ScalarHits {
+    unsigned mask;
+    WIVE_INLINE unsigned count() const { return static_cast<unsigned>(__builtin_popcount(mask)); }
+};
+WIVE_INLINE ScalarHits hits(const ScalarLanes<float, 8>& tnear, const ScalarLanes<float, 8>& tfar) {
+    return {less_equal(tnear, tfar)};
+}
+
 struct Scalar {
     using Float4 = ScalarLanes<float, 4>;
     using Double4 = ScalarLanes<double, 4>;
@@ -107,44 +116,46 @@ struct Scalar {
         WIVE_INLINE unsigned slot(int i) const { return row[i] >> shift & 7u; }
     };
 
-    // Stores the children that hit at `top` and beyond; returns how many.
-    template <bool in_order>
-    WIVE_INLINE static unsigned store_hits(const Stack::Top& top, Order order, const Float8& tnear, const Float8& tfar,
-                                           const std::uint32_t* child) {
-        unsigned count = 0;
-        for (int i = 0; i < node_width; ++i) {  // always store, step on where it hit: no branch on the hit
-            const unsigned slot = in_order ? order.slot(i) : static_cast<unsigned>(i);
-            top.distance(count) = tnear.v[slot];
-            top.child(count) = child[slot];
-            count += tnear.v[slot] <= tfar.v[slot];
-        }
-        return count;
-    }
+    using Hits = ScalarHits;
 
-    // As Avx512::push.
+    // As Avx512::Lanes.
     template <bool in_order>
-    WIVE_INLINE static std::uint32_t push(Stack::Top& top, Order order, const Float8& tnear, const Float8& tfar,
-                                          const std::uint32_t* child) {
-        top.move(static_cast<std::ptrdiff_t>(store_hits<in_order>(top, order, tnear, tfar, child)) - 1);
-        return top.child();
-    }
+    struct Lanes {
+        Hits by_slot;
+        const Float8& tnear;
+        const std::uint32_t* child;
+        unsigned slots[node_width];
+
+        WIVE_INLINE Lanes(Order order, Hits hit, const Float8& distances, const std::uint32_t* children)
+            : by_slot(hit), tnear(distances), child(children) {
+            for (int i = 0; i < node_width; ++i) slots[i] = in_order ? order.slot(i) : static_cast<unsigned>(i);
+        }
+        WIVE_INLINE void compress_to(Stack::Top top) const {
+            for (const unsigned slot : slots) {  // always store, step on where it hit: no branch on the hit
+                top.distance() = tnear.v[slot];
+                top.child() = child[slot];
+                top.move(by_slot.mask >> slot & 1u);
+            }
+        }
+        WIVE_INLINE std::uint32_t last_hit() const {
+            int i = node_width - 1;
+            while (!(by_slot.mask >> slots[i] & 1u)) --i;
+            return child[slots[i]];
+        }
+    };
 };
 
 // Scalar with the children sorted by true entry distance instead of the stored order: what sorting would buy.
 struct ScalarByDistance : Scalar {
     template <bool in_order>
-    WIVE_INLINE static std::uint32_t push(Stack::Top& top, Order order, const Float8& tnear, const Float8& tfar,
-                                          const std::uint32_t* child) {
-        const unsigned count = store_hits<in_order>(top, order, tnear, tfar, child);
-        for (unsigned i = 1; i < count; ++i) {
-            for (unsigned k = i; k > 0 && top.distance(k - 1) < top.distance(k); --k) {
-                std::swap(top.distance(k - 1), top.distance(k));
-                std::swap(top.child(k - 1), top.child(k));
-            }
+    struct Lanes : Scalar::Lanes<in_order> {
+        WIVE_INLINE Lanes(Order order, Hits hit, const Float8& distances, const std::uint32_t* children)
+            : Scalar::Lanes<in_order>(order, hit, distances, children) {
+            for (int i = 1; i < node_width; ++i)
+                for (int k = i; k > 0 && distances.v[this->slots[k - 1]] < distances.v[this->slots[k]]; --k)
+                    std::swap(this->slots[k - 1], this->slots[k]);
         }
-        top.move(static_cast<std::ptrdiff_t>(count) - 1);
-        return top.child();
-    }
+    };
 };
 
 }  // namespace wive

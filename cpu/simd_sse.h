@@ -70,4 +70,20 @@ struct SseFloat4 {
     }
 };
 
+// Which of eight lanes were hit, as a vector of all-ones and all-zeros.
+struct AvxHits {
+    __m256 v;
+    WIVE_INLINE unsigned count() const {
+        return static_cast<unsigned>(_mm_popcnt_u32(static_cast<unsigned>(_mm256_movemask_ps(v))));
+    }
+};
+
+// The child in the last lane that was hit, of at least one. It goes through memory, where it was stored before the
+// boxes were decided: only the lane has to be waited for.
+WIVE_INLINE std::uint32_t last_hit_child(__m256i children, __m256 hits) {
+    alignas(32) std::uint32_t lanes[8];
+    _mm256_store_si256(reinterpret_cast<__m256i*>(lanes), children);
+    return lanes[31 - _lzcnt_u32(static_cast<unsigned>(_mm256_movemask_ps(hits)))];
+}
+
 }  // namespace wive

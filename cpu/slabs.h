@@ -6,6 +6,11 @@
 
 namespace wive {
 
+template <class Float8>
+struct Interval {
+    Float8 tnear, tfar;
+};
+
 [[gnu::always_inline]] inline const float* row(const Node& node, std::size_t offset) {
     return reinterpret_cast<const float*>(reinterpret_cast<const std::byte*>(&node) + offset);
 }
@@ -32,22 +37,18 @@ struct FullSlabs {
         order_shift = 4 * (7 - ray.octant);
     }
 
-    // Pushes the children that the ray meets within [tmin, tmax] and moves top to the nearest; returns what is there.
-    template <bool in_order>
-    [[gnu::always_inline]] std::uint32_t visit(const Node& node, float tmax, Stack::Top& top) const {
-        // (A) order
-        const typename Isa::Order order{node.order, order_shift};
-        // (B) slabs
+    [[gnu::always_inline]] typename Isa::Order order(const Node& node) const { return {node.order, order_shift}; }
+
+    // Entry and exit distances, cut to [tmin, tmax]; a child is hit where entry <= exit.
+    [[gnu::always_inline]] Interval<Float8> test(const Node& node, float tmax) const {
         const auto near_plane = [&](unsigned axis) {
             return multiply_add(Float8::load(row(node, near_row[axis])), rdir[axis], near_bias[axis]);
         };
         const auto far_plane = [&](unsigned axis) {
             return multiply_add(Float8::load(row(node, far_row[axis])), rdir[axis], far_bias[axis]);
         };
-        const Float8 tnear = max(max(near_plane(0), near_plane(1)), max(near_plane(2), tmin));
-        const Float8 tfar = min(min(far_plane(0), far_plane(1)), min(far_plane(2), Float8::all(tmax)));
-        // (C) permute and compress, (D) store
-        return Isa::template push<in_order>(top, order, tnear, tfar, node.child);
+        return {max(max(near_plane(0), near_plane(1)), max(near_plane(2), tmin)),
+                min(min(far_plane(0), far_plane(1)), min(far_plane(2), Float8::all(tmax)))};
     }
 };
 

@@ -42,6 +42,50 @@ struct StepCounters {
     for (unsigned line = 0; line < 4; ++line) __builtin_prefetch(reinterpret_cast<const void*>(address + 64 * line));
 }
 
+// Offers the triangles of a leaf to the query; true once the query is done.
+template <class Triangles, class Query, class Counters>
+[[gnu::always_inline]] inline bool test_leaf(const TriangleBlock* block, std::uint32_t count, const Triangles& triangles,
+                                             Query& query, Counters& counters) {
+    for (std::uint32_t i = 0; i < count; ++i) {
+        counters.block(block[i]);
+        if (triangles.test(block[i], query)) return true;
+    }
+    return false;
+}
+
+// Visits an inner node: the children that the ray meets go onto the stack, and top moves to the last of them, the
+// nearest; or to the entry below, where none was met. No branch: the same steps for no hit and for eight.
+template <bool in_order, class Isa, template <class> class Slabs>
+[[gnu::always_inline]] inline void visit(const Node& node, const Slabs<Isa>& slabs, float tmax, Stack::Top& top) {
+    const auto order = slabs.order(node);                                                     // (A) order
+    const auto [tnear, tfar] = slabs.test(node, tmax);                                        // (B) slabs
+    const auto hit = hits(tnear, tfar);
+    const typename Isa::template Lanes<in_order> lanes(order, hit, tnear, node.child);        // (C) permute,
+    lanes.compress_to(top);                                                                   //     compress,
+    top.move(static_cast<std::ptrdiff_t>(hit.count()) - 1);                                   // (D) store
+}
+
+// The same for one ray on its own, whose next step can't begin before the next child is known. Two short cuts hand
+// that child on sooner: it does not come back through the stack, and one branch asks whether anything was hit at all.
+// Predicted, it lets the processor go on with what lies below on the stack while this node's boxes are still being
+// decided: 40 cycles a node without it, 26 with it, where rays are alike (docs/design.md).
+template <bool in_order, class Isa, template <class> class Slabs>
+[[gnu::always_inline]] inline std::uint32_t visit_and_take(const Node& node, const Slabs<Isa>& slabs, float tmax,
+                                                           Stack::Top& top) {
+    const auto order = slabs.order(node);
+    const auto [tnear, tfar] = slabs.test(node, tmax);
+    const auto hit = hits(tnear, tfar);
+    const unsigned count = hit.count();
+    if (count == 0) {
+        top.move(-1);
+        return top.child();
+    }
+    const typename Isa::template Lanes<in_order> lanes(order, hit, tnear, node.child);
+    lanes.compress_to(top);
+    top.move(static_cast<std::ptrdiff_t>(count) - 1);
+    return lanes.last_hit();
+}
+
 template <class Isa, template <class> class Slabs, template <class> class Triangles, class Query, class Counters>
 [[gnu::noinline]] void traverse(const BvhView& bvh, const RayFrame<Isa>& ray, Query& result, Counters& counters) {
     const Slabs<Isa> slabs(ray);
@@ -62,21 +106,16 @@ template <class Isa, template <class> class Slabs, template <class> class Triang
     for (;;) {
         while (is_inner(child)) {
             counters.inner_node();
-            child = slabs.template visit<Query::in_order>(bvh.node(child), query.tmax, top);
+            child = visit_and_take<Query::in_order>(bvh.node(child), slabs, query.tmax, top);
             prefetch(bvh, top.child(-1));  // the one after next; the next is needed at once anyway
             skip_hidden();
         }
         if (child == end_of_stack) break;
         counters.leaf();
-        const TriangleBlock* block = bvh.leaf(child);
-        for (std::uint32_t i = 0; i < leaf_block_count(child); ++i) {
-            counters.block(block[i]);
-            if (triangles.test(block[i], query)) goto done;
-        }
+        if (test_leaf(bvh.leaf(child), leaf_block_count(child), triangles, query, counters)) break;
         take_next();
         skip_hidden();
     }
-done:
     result = query;
 }
 
