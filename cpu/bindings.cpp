@@ -12,6 +12,7 @@
 #include "dispatch.h"
 #include "parallel.h"
 #include "render.h"
+#include "trace.h"
 
 namespace py = pybind11;
 
@@ -26,9 +27,6 @@ constexpr const char* compiler_name = "clang " __clang_version__;
 #else
 constexpr const char* compiler_name = "gcc " __VERSION__;
 #endif
-
-// Rays to a thread at a time: large enough that handing them out costs nothing, small enough to share well.
-constexpr std::size_t rays_per_chunk = 1024;
 
 void expect(bool condition, const char* message) {
     if (!condition) throw std::invalid_argument(message);
@@ -96,19 +94,9 @@ Rays ray_batch(const Array<float>& origins, const Array<float>& directions, cons
             static_cast<std::size_t>(n)};
 }
 
-void trace(const Bvh& bvh, TraceBatch kernel, const Rays& rays, const HitBatch& hits, unsigned threads) {
-    expect(kernel != nullptr, "kernel: not made for this query");
-    const BvhView view = bvh.view();
-    py::gil_scoped_release release;
-    if (rays.count <= rays_per_chunk) return kernel(view, rays.batch, hits, 0, rays.count);
-    parallel_chunks(rays.count, rays_per_chunk, thread_count(threads), [&](std::size_t begin, std::size_t end) {
-        kernel(view, rays.batch, hits, begin, end);
-    });
-}
-
 py::tuple intersect(const PyBvh& self, const std::string& kernel, const Array<float>& origins,
                     const Array<float>& directions, const Array<float>& tmin, const Array<float>& tmax, unsigned threads,
-                    unsigned, bool stats) {
+                    unsigned in_flight, bool stats) {
     const Rays rays = ray_batch(origins, directions, tmin, tmax);
     const py::ssize_t n = origins.shape(0);
     Array<float> t(n), uv({n, py::ssize_t{2}});
@@ -120,13 +108,18 @@ py::tuple intersect(const PyBvh& self, const std::string& kernel, const Array<fl
     hits.uv = uv.mutable_data();
     if (stats) hits.stats = steps.emplace(std::vector<py::ssize_t>{n, 3}).mutable_data();
     const auto accuracy = static_cast<std::size_t>(self.bvh().accuracy());
-    trace(self.bvh(), find_kernels(kernel).closest[accuracy][stats], rays, hits, threads);
+    const KernelTable& table = find_kernels(kernel);
+    const BvhView bvh = self.bvh().view();
+    {
+        py::gil_scoped_release release;
+        trace(table, table.closest[accuracy][stats], bvh, rays.batch, hits, rays.count, threads, in_flight);
+    }
     return py::make_tuple(std::move(t), std::move(prim), std::move(uv), std::move(steps));
 }
 
 py::tuple occluded(const PyBvh& self, const std::string& kernel, const Array<float>& origins,
                    const Array<float>& directions, const Array<float>& tmin, const Array<float>& tmax, unsigned threads,
-                   unsigned, bool stats) {
+                   unsigned in_flight, bool stats) {
     const Rays rays = ray_batch(origins, directions, tmin, tmax);
     const py::ssize_t n = origins.shape(0);
     Array<bool> mask(n);
@@ -135,7 +128,12 @@ py::tuple occluded(const PyBvh& self, const std::string& kernel, const Array<flo
     hits.occluded = mask.mutable_data();
     if (stats) hits.stats = steps.emplace(std::vector<py::ssize_t>{n, 3}).mutable_data();
     const auto accuracy = static_cast<std::size_t>(self.bvh().accuracy());
-    trace(self.bvh(), find_kernels(kernel).any[accuracy][stats], rays, hits, threads);
+    const KernelTable& table = find_kernels(kernel);
+    const BvhView bvh = self.bvh().view();
+    {
+        py::gil_scoped_release release;
+        trace(table, table.any[accuracy][stats], bvh, rays.batch, hits, rays.count, threads, in_flight);
+    }
     return py::make_tuple(std::move(mask), std::move(steps));
 }
 
@@ -150,7 +148,8 @@ std::uint64_t render(const PyBvh& self, const std::string& kernel, const Array<f
     const auto row = [&](py::ssize_t i) { return load_vec3(camera.data(i, 0)); };
     const RenderJob job = {self.bvh().view(),
                            self.mesh(),
-                           find_kernels(kernel).closest[static_cast<std::size_t>(self.bvh().accuracy())][0],
+                           find_kernels(kernel),
+                           self.bvh().accuracy(),
                            {row(0), row(1), row(2), row(3)},
                            static_cast<int>(image.shape(1)),
                            static_cast<int>(image.shape(0)),

@@ -1,8 +1,8 @@
 // Instantiates a table of kernels; included once in each instruction set's own translation unit.
 #pragma once
 
+#include "in_flight.h"
 #include "kernels.h"
-#include "traversal.h"
 #include "triangle_fast.h"
 #include "triangle_watertight.h"
 
@@ -11,6 +11,7 @@ namespace wive {
 template <class Isa, template <class> class Slabs>
 constexpr KernelTable make_kernel_table(std::string_view name) {
     return {name,
+            sizeof(Flight<Isa, ClosestHit, StepCounters>),  // the largest
             {{trace_batch<Isa, Slabs, FastTriangles, ClosestHit, NoCounters>,
               trace_batch<Isa, Slabs, FastTriangles, ClosestHit, StepCounters>},
              {trace_batch<Isa, Slabs, WatertightTriangles, ClosestHit, NoCounters>,

@@ -8,10 +8,14 @@
 
 namespace wive {
 
-using TraceBatch = void (*)(const BvhView&, const RayBatch&, const HitBatch&, std::size_t begin, std::size_t end);
+// One thread's share of a batch: rays come from the source until it is empty. in_flight rays are traced in turns;
+// 1 is plain single-ray traversal. scratch: in_flight * flight_bytes of 64-byte aligned memory where it is above 1.
+using TraceBatch = void (*)(const BvhView&, const RayBatch&, const HitBatch&, const RaySource&, unsigned in_flight,
+                            std::byte* scratch);
 
 struct KernelTable {
     std::string_view name;
+    std::size_t flight_bytes;
     // Indexed by accuracy, then by whether steps are counted. A null pointer: not made for this table.
     TraceBatch closest[accuracy_count][2];
     TraceBatch any[accuracy_count][2];

@@ -24,6 +24,20 @@ struct HitBatch {
     std::int32_t* stats = nullptr; // (n, 3) inner nodes, leaves, triangles
 };
 
+// Hands out the rays of a batch, a run at a time, to all the threads that trace it.
+struct RaySource {
+    std::size_t* next;  // shared; the first ray that nobody has taken
+    std::size_t count, run;
+
+    [[gnu::always_inline]] bool take(std::size_t& begin, std::size_t& end) const {
+        begin = __atomic_fetch_add(next, run, __ATOMIC_RELAXED);
+        end = count - begin < run ? count : begin + run;
+        return begin < count;
+    }
+};
+
+inline constexpr int max_in_flight = 64;
+
 inline constexpr std::uint32_t no_prim = 0xffffffffu;
 
 }  // namespace wive

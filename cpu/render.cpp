@@ -7,6 +7,7 @@
 
 #include "parallel.h"
 #include "random.h"
+#include "trace.h"
 
 namespace wive {
 namespace {
@@ -115,7 +116,8 @@ private:
         hits.t = t_.data();
         hits.prim = prim_.data();
         hits.uv = uv_.data();
-        job_.trace(job_.bvh, {origins_.data(), directions_.data(), &zero, &infinity, 0, 0}, hits, 0, paths_.size());
+        wive::trace(job_.kernels, job_.kernels.closest[static_cast<std::size_t>(job_.accuracy)][0], job_.bvh,
+                    {origins_.data(), directions_.data(), &zero, &infinity, 0, 0}, hits, paths_.size(), 1, 0);
     }
 
     // Paths that escape bring the sky's light home; the others bounce, until they have bounced enough.

@@ -18,7 +18,8 @@ enum class Albedo { gray, normals };
 struct RenderJob {
     BvhView bvh;
     Mesh mesh;
-    TraceBatch trace;  // closest hit; the only thing that differs between kernels
+    const KernelTable& kernels;  // the only thing that differs between instruction sets
+    Accuracy accuracy;
     Camera camera;
     int width, height;
     int samples, bounces;

@@ -22,6 +22,7 @@ struct alignas(64) Stack {
 
     class Top {
     public:
+        Top() = default;
         [[gnu::always_inline]] explicit Top(Stack& stack) : distance_(stack.distances + 2) {
             for (int i = 0; i < 2; ++i) {
                 stack.distances[i] = -std::numeric_limits<float>::infinity();
@@ -35,7 +36,7 @@ struct alignas(64) Stack {
         [[gnu::always_inline]] void move(std::ptrdiff_t entries) { distance_ += entries; }
 
     private:
-        float* distance_;
+        float* distance_ = nullptr;
     };
 };
 

@@ -120,20 +120,17 @@ template <class Isa, template <class> class Slabs, template <class> class Triang
 }
 
 template <class Isa, template <class> class Slabs, template <class> class Triangles, class Query, class Counters>
-void trace_batch(const BvhView& bvh, const RayBatch& rays, const HitBatch& hits, std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) {
-        RayFrame<Isa> ray;
-        Counters counters;
-        if (!ray.load(bvh, rays, i)) {
-            Query{0, 0}.write(hits, i, 1);
+void trace_one_by_one(const BvhView& bvh, const RayBatch& rays, const HitBatch& hits, const RaySource& source) {
+    for (std::size_t begin, end; source.take(begin, end);)
+        for (std::size_t i = begin; i < end; ++i) {
+            RayFrame<Isa> ray;
+            Query query{0, 0};
+            Counters counters;
+            ray.scale = 1;
+            if (ray.load(bvh, rays, i)) traverse<Isa, Slabs, Triangles>(bvh, ray, query, counters);
+            query.write(hits, i, ray.scale);
             counters.write(hits, i);
-            continue;
         }
-        Query query{0, 0};
-        traverse<Isa, Slabs, Triangles>(bvh, ray, query, counters);
-        query.write(hits, i, ray.scale);
-        counters.write(hits, i);
-    }
 }
 
 }  // namespace wive

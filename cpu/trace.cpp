@@ -1,0 +1,36 @@
+#include "trace.h"
+
+#include <algorithm>
+
+#include "large_array.h"
+#include "parallel.h"
+
+namespace wive {
+namespace {
+
+// Rays to a thread at a time: large enough that handing them out costs nothing, small enough to share well.
+constexpr std::size_t rays_per_run = 1024;
+// Rays in flight where the caller leaves the choice: `python -m bench inflight` measures it.
+constexpr unsigned usual_in_flight = 32;
+// Fewer rays than this are traced one by one: filling and draining the flights would take most of the time.
+constexpr std::size_t fewest_in_flight = 16;
+
+}  // namespace
+
+void trace(const KernelTable& table, TraceBatch kernel, const BvhView& bvh, const RayBatch& rays, const HitBatch& hits,
+           std::size_t count, unsigned threads, unsigned in_flight) {
+    if (in_flight == 0) in_flight = count < fewest_in_flight ? 1 : usual_in_flight;
+    in_flight = std::min<unsigned>(in_flight, max_in_flight);
+    in_flight = static_cast<unsigned>(std::min<std::size_t>(in_flight, count));
+    std::size_t next = 0;
+    const RaySource source = {&next, count, rays_per_run};
+    const auto work = [&](std::size_t) {
+        const LargeArray<std::byte> scratch(in_flight > 1 ? in_flight * table.flight_bytes : 0);
+        kernel(bvh, rays, hits, source, in_flight, const_cast<std::byte*>(scratch.data()));
+    };
+    const std::size_t runs = (count + rays_per_run - 1) / rays_per_run;
+    const unsigned workers = runs <= 1 ? 1 : static_cast<unsigned>(std::min<std::size_t>(runs, thread_count(threads)));
+    parallel_for(workers, workers, work);
+}
+
+}  // namespace wive
