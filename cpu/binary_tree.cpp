@@ -31,7 +31,9 @@ struct BinMap {
     int count;
 
     explicit BinMap(const Range& range)
-        : base(range.centroids.lo), scale{}, count(static_cast<int>(std::min(32.0f, 4.0f + 0.05f * static_cast<float>(range.size())))) {
+        : base(range.centroids.lo),
+          scale{},
+          count(static_cast<int>(std::min<float>(max_bins, 4.0f + 0.05f * static_cast<float>(range.size())))) {
         const Float4v extent = range.centroids.hi - range.centroids.lo;
         for (int axis = 0; axis < 3; ++axis)
             if (extent[axis] > 1e-34f) scale[axis] = 0.9999f * static_cast<float>(count) / extent[axis];
@@ -105,11 +107,6 @@ Split best_split(const Bins& bins, const BinMap& bin_of) {
     return best;
 }
 
-// Whether SAH may still choose: halving must be able to finish within the depth that is left.
-bool deep_enough_left(const Range& range) {
-    return range.depth + std::bit_width(blocks_for(range.size())) < max_depth;
-}
-
 struct Halves {
     Range left, right;
     int axis;
@@ -117,8 +114,11 @@ struct Halves {
 
 class TreeBuilder {
 public:
-    TreeBuilder(BinaryTree& tree, unsigned threads)
-        : tree_(tree), scratch_(tree.count > parallel_range ? tree.count : 0), threads_(threads) {}
+    TreeBuilder(BinaryTree& tree, unsigned threads, int depth_limit)
+        : tree_(tree),
+          scratch_(tree.count > parallel_range ? tree.count : 0),
+          threads_(threads),
+          depth_limit_(depth_limit) {}
 
     void build() {
         struct Item {
@@ -165,6 +165,11 @@ public:
     }
 
 private:
+    // Whether SAH may still choose: halving must be able to finish within the depth that is left.
+    bool may_choose(const Range& range) const {
+        return range.depth + static_cast<int>(std::bit_width(blocks_for(range.size()))) < depth_limit_;
+    }
+
     Range whole_range() {
         std::vector<Range> parts((tree_.count + chunk_size - 1) / chunk_size);
         parallel_chunks(tree_.count, chunk_size, threads_, [&](std::size_t begin, std::size_t end) {
@@ -245,7 +250,7 @@ private:
         PrimRef* refs = tree_.refs.data();
         const BinMap bin_of(range);
         Split split;
-        if (deep_enough_left(range)) {
+        if (may_choose(range)) {
             Bins bins(bin_of.count);
             bins.add(refs, range.begin, range.end, bin_of);
             split = best_split(bins, bin_of);
@@ -282,7 +287,7 @@ private:
         });
         Bins bins(bin_of.count);
         for (const Bins& part : parts) bins.add(part, bin_of.count);
-        const Split split = deep_enough_left(range) ? best_split(bins, bin_of) : Split{};
+        const Split split = may_choose(range) ? best_split(bins, bin_of) : Split{};
         if (split.axis < 0) {
             const Halves halves = split_by_number(range, from);
             std::copy(from + range.begin, from + range.end, to + range.begin);
@@ -324,16 +329,17 @@ private:
     BinaryTree& tree_;
     LargeArray<PrimRef> scratch_;
     unsigned threads_;
+    int depth_limit_;
 };
 
 }  // namespace
 
-BinaryTree build_binary_tree(LargeArray<PrimRef> refs, std::uint32_t count, unsigned threads) {
+BinaryTree build_binary_tree(LargeArray<PrimRef> refs, std::uint32_t count, unsigned threads, int depth_limit) {
     BinaryTree tree;
     tree.refs = std::move(refs);
     tree.count = count;
     tree.nodes = LargeArray<BinaryNode>(count);
-    if (count > 0) TreeBuilder(tree, threads).build();
+    if (count > 0) TreeBuilder(tree, threads, depth_limit).build();
     return tree;
 }
 

@@ -40,7 +40,8 @@ struct BinaryTree {
     Box box;
 };
 
-// Binned SAH, leaf cost counted in blocks of four. The same tree whatever the number of threads.
-BinaryTree build_binary_tree(LargeArray<PrimRef> refs, std::uint32_t count, unsigned threads);
+// Binned SAH, leaf cost counted in blocks of four. The same tree whatever the number of threads. At most depth_limit
+// levels deep: where the rest could be too deep, ranges are halved by number, which bit_width(blocks) levels finish.
+BinaryTree build_binary_tree(LargeArray<PrimRef> refs, std::uint32_t count, unsigned threads, int depth_limit);
 
 }  // namespace wive

@@ -54,11 +54,12 @@ ChildOrder parse_order(const std::string& name) {
 class PyBvh {
 public:
     PyBvh(Array<float> vertices, Array<std::int32_t> faces, const std::string& accuracy, const std::string& order,
-          unsigned threads)
+          unsigned threads, int depth_limit)
         : vertices_(std::move(vertices)), faces_(std::move(faces)) {
         expect_shape(vertices_, 3, "vertices: expected shape (v, 3)");
         expect_shape(faces_, 3, "faces: expected shape (f, 3)");
-        const BuildOptions options = {parse_accuracy(accuracy), parse_order(order), threads};
+        expect(depth_limit >= 1 && depth_limit <= max_depth, "depth_limit: expected 1 to 64");
+        const BuildOptions options = {parse_accuracy(accuracy), parse_order(order), threads, depth_limit};
         const Mesh view = mesh();
         py::gil_scoped_release release;
         bvh_ = std::make_unique<Bvh>(view, options);
@@ -189,9 +190,9 @@ PYBIND11_MODULE(_cpu, m, py::mod_gil_not_used()) {
     });
     const auto array = [](const char* name) { return py::arg(name).noconvert(); };
     py::class_<PyBvh>(m, "Bvh")
-        .def(py::init<Array<float>, Array<std::int32_t>, const std::string&, const std::string&, unsigned>(),
+        .def(py::init<Array<float>, Array<std::int32_t>, const std::string&, const std::string&, unsigned, int>(),
              array("vertices"), array("faces"), py::arg("accuracy") = "watertight", py::arg("order") = "treelet",
-             py::arg("threads") = 0)
+             py::arg("threads") = 0, py::arg("depth_limit") = max_depth)
         .def_property_readonly("nodes", [](py::object self) {
             const auto nodes = self.cast<const PyBvh&>().bvh().nodes();
             return view(self, {static_cast<py::ssize_t>(nodes.size()), 8, 8},

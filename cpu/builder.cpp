@@ -246,7 +246,8 @@ Bvh::Bvh(const Mesh& mesh, const BuildOptions& options) : accuracy_(options.accu
     check_mesh(mesh, threads);
     std::size_t count = 0;
     LargeArray<PrimRef> refs = make_prim_refs(mesh, threads, count);
-    const BinaryTree tree = build_binary_tree(std::move(refs), static_cast<std::uint32_t>(count), threads);
+    const BinaryTree tree = 
+        build_binary_tree(std::move(refs), static_cast<std::uint32_t>(count), threads, options.depth_limit);
     for (std::size_t axis = 0; axis < 3; ++axis) {
         bounds_[0][axis] = tree.box.lo[axis];
         bounds_[1][axis] = tree.box.hi[axis];

@@ -16,6 +16,7 @@ struct BuildOptions {
     Accuracy accuracy = Accuracy::watertight;
     ChildOrder order = ChildOrder::treelet;
     unsigned threads = 0;  // 0: every core
+    int depth_limit = max_depth;
 };
 
 class Bvh {

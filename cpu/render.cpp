@@ -12,7 +12,7 @@
 namespace wive {
 namespace {
 
-constexpr float gray_albedo = 0.8f;
+constexpr float gray_albedo = 0.6f;
 constexpr int tile_width = 32;
 constexpr std::size_t wave_size = 4096;  // paths traced together by one thread
 

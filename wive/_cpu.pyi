@@ -27,6 +27,7 @@ class Bvh:
         accuracy: Literal["fast", "watertight"] = "watertight",
         order: Literal["treelet", "diagonal", "none"] = "treelet",
         threads: int = 0,
+        depth_limit: int = 64,
     ) -> None:
         """Build over vertices (v,3), faces (f,3). threads 0 means every core.
 
