@@ -25,6 +25,8 @@ ACCURACIES = ("fast", "watertight")
 KERNELS = ("avx512", "avx2")
 PARTS = ("speed", "build", "tree")
 BUILD_THREADS = (1, 2)
+IN_FLIGHT = (1, 32)
+RAYS = 131_072  # of each kind and scene
 QUICK_RAYS = 16_384
 
 SPEED_COLUMNS = [
@@ -57,9 +59,7 @@ def main(options: Sequence[str]) -> None:
         sets = []
         if "speed" in chosen.parts:
             recorded = recorded_rays(mesh)
-            sets = [
-                recorded[kind].thinned(QUICK_RAYS) if chosen.quick else recorded[kind] for kind in chosen.rays
-            ]
+            sets = [recorded[kind].thinned(QUICK_RAYS if chosen.quick else RAYS) for kind in chosen.rays]
         for accuracy in chosen.accuracy:
             if "tree" in chosen.parts:
                 trees.append(tree_row(mesh, accuracy, contenders[0].isa))
@@ -132,7 +132,7 @@ def parse_options(options: Sequence[str]) -> argparse.Namespace:
         "--kernels", type=listed(), default=KERNELS, help="wive's kernels, e.g. avx512.full,avx2"
     )
     parser.add_argument(
-        "--in-flight", type=numbers, default=(1,), help="rays interleaved per thread, e.g. 1,32"
+        "--in-flight", type=numbers, default=IN_FLIGHT, help="rays interleaved per thread, e.g. 1,32"
     )
     parser.add_argument("--accuracy", type=listed(ACCURACIES), default=ACCURACIES, help=", ".join(ACCURACIES))
     parser.add_argument("--rays", type=listed(KINDS), default=KINDS, help=", ".join(KINDS))
@@ -145,6 +145,6 @@ def parse_options(options: Sequence[str]) -> argparse.Namespace:
 
 def is_whole(chosen: argparse.Namespace) -> bool:
     """Whether nothing that docs quote was left out."""
-    everything = {"kernels": KERNELS, "accuracy": ACCURACIES, "rays": KINDS, "parts": PARTS}
+    everything = {"kernels": KERNELS, "in_flight": IN_FLIGHT, "accuracy": ACCURACIES, "rays": KINDS, "parts": PARTS}
     complete = all(set(getattr(chosen, name)) >= set(values) for name, values in everything.items())
     return complete and not chosen.quick and not chosen.scenes

@@ -29,7 +29,7 @@ class Effort:
     """When to stop: once the median's uncertainty is below `precision`, or after `most` rounds."""
 
     least: int = 7
-    most: int = 31
+    most: int = 15
     precision: float = 0.005
 
 
