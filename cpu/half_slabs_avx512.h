@@ -21,9 +21,8 @@ struct HalfSlabs {
         for (unsigned axis = 0; axis < 3; ++axis) {
             rdir[axis] = both(ray.rdir[axis], -ray.rdir[axis]);
             bias[axis] = both(ray.near_bias[axis], -ray.far_bias[axis]);
-            const std::size_t row_bytes = sizeof(Node::planes[0]), negative = ray.octant >> axis & 1u;
-            near_row[axis] = row_bytes * (2 * axis + negative);
-            far_row[axis] = row_bytes * (2 * axis + 1 - negative);
+            near_row[axis] = ray.near_row[axis];
+            far_row[axis] = ray.near_row[axis] ^ row_bytes;
         }
         order_shift = 4 * (7 - ray.octant);
     }

@@ -22,12 +22,13 @@ struct alignas(64) Flight {
 };
 
 // Flights that wait for the same kind of step, so that each kind has a loop to itself and no step has to ask.
+template <class State>
 struct Waiting {
-    std::uint8_t flights[max_in_flight];
+    State* flights[max_in_flight];
     unsigned count = 0;
 
     // Writes always, counts only if it is so: no branch.
-    [[gnu::always_inline]] void add_if(bool condition, std::uint8_t flight) {
+    [[gnu::always_inline]] void add_if(bool condition, State* flight) {
         flights[count] = flight;
         count += condition;
     }
@@ -44,8 +45,7 @@ public:
 
     void trace(unsigned in_flight) {
         for (unsigned i = 0; i < in_flight; ++i) {
-            new (flights_ + i) State;
-            start(static_cast<std::uint8_t>(i));
+            start(*new (flights_ + i) State);
         }
         while (at_node_.count + at_leaf_.count > 0) {
             visit_nodes();
@@ -56,8 +56,7 @@ public:
 
 private:
     // Puts the next ray that can hit anything into a flight's place; rays that can't are answered here.
-    void start(std::uint8_t flight) {
-        State& f = flights_[flight];
+    void start(State& f) {
         for (;; ++next_) {
             if (next_ == end_ && !source_.take(next_, end_)) {
                 end_ = next_;
@@ -73,30 +72,29 @@ private:
         f.query = Query{f.ray.tmin, f.ray.tmax};
         f.top = Stack::Top(f.stack);
         f.top.child() = inner_child(0);  // the root
-        at_node_.add_if(true, flight);
+        at_node_.add_if(true, &f);
     }
 
     // The child on top is next: prefetched now, and waited for in the right place.
-    [[gnu::always_inline]] void wait(State& f, std::uint8_t flight) {
+    [[gnu::always_inline]] void wait(State& f) {
         if constexpr (Query::in_order)
             while (f.top.distance() > f.query.tmax) f.top.move(-1);
         const std::uint32_t child = f.top.child();
         prefetch(bvh_, child);
         const bool inner = is_inner(child), end = child == end_of_stack;
-        at_node_.add_if(inner, flight);
-        at_leaf_.add_if(!inner & !end, flight);
-        done_.add_if(end, flight);
+        at_node_.add_if(inner, &f);
+        at_leaf_.add_if(!inner & !end, &f);
+        done_.add_if(end, &f);
     }
 
     [[gnu::always_inline]] void visit_nodes() {
         const unsigned count = at_node_.count;
         at_node_.count = 0;  // refilled from the front, never past the flight at hand
         for (unsigned i = 0; i < count; ++i) {
-            const std::uint8_t flight = at_node_.flights[i];
-            State& f = flights_[flight];
+            State& f = *at_node_.flights[i];
             f.counters.inner_node();
             visit<Query::in_order>(bvh_.node(f.top.child()), Slabs<Isa>(f.ray), f.query.tmax, f.top);
-            wait(f, flight);
+            wait(f);
         }
     }
 
@@ -104,24 +102,23 @@ private:
         const unsigned count = at_leaf_.count;
         at_leaf_.count = 0;
         for (unsigned i = 0; i < count; ++i) {
-            const std::uint8_t flight = at_leaf_.flights[i];
-            State& f = flights_[flight];
+            State& f = *at_leaf_.flights[i];
             const std::uint32_t child = f.top.child();
             f.counters.leaf();
             const bool finished =
                 test_leaf(bvh_.leaf(child), leaf_block_count(child), Triangles<Isa>(f.ray), f.query, f.counters);
             if (finished) f.top = Stack::Top(f.stack);
             f.top.move(-1);
-            wait(f, flight);
+            wait(f);
         }
     }
 
     [[gnu::always_inline]] void finish_and_replace() {
         for (unsigned i = 0; i < done_.count; ++i) {
-            State& f = flights_[done_.flights[i]];
+            State& f = *done_.flights[i];
             f.query.write(hits_, f.index, f.ray.scale);
             f.counters.write(hits_, f.index);
-            start(done_.flights[i]);
+            start(f);
         }
         done_.count = 0;
     }
@@ -131,7 +128,7 @@ private:
     const HitBatch hits_;
     const RaySource source_;
     State* flights_;
-    Waiting at_node_, at_leaf_, done_;
+    Waiting<State> at_node_, at_leaf_, done_;
     std::size_t next_ = 0, end_ = 0;
 };
 

@@ -19,6 +19,7 @@ struct alignas(64) Node {
     std::uint32_t order[node_width];
 };
 static_assert(sizeof(Node) == 256);
+inline constexpr std::uint32_t row_bytes = sizeof(Node::planes[0]);
 
 // Four triangles side by side. rows[3 * k + axis] holds vertex k (watertight), or v0, v1 - v0, v2 - v0 (fast).
 // Unused lanes hold NaN, which passes no test, and prim -1.

@@ -29,9 +29,8 @@ struct FullSlabs {
             rdir[axis] = Float8::all(ray.rdir[axis]);
             near_bias[axis] = Float8::all(ray.near_bias[axis]);
             far_bias[axis] = Float8::all(ray.far_bias[axis]);
-            const std::size_t row_bytes = sizeof(Node::planes[0]), negative = ray.octant >> axis & 1u;
-            near_row[axis] = row_bytes * (2 * axis + negative);
-            far_row[axis] = row_bytes * (2 * axis + 1 - negative);
+            near_row[axis] = ray.near_row[axis];
+            far_row[axis] = ray.near_row[axis] ^ row_bytes;
         }
         // The stack wants the farthest child first, and octant 7 - o is octant o backwards.
         order_shift = 4 * (7 - ray.octant);

@@ -11,7 +11,7 @@ namespace {
 // Rays to a thread at a time: large enough that handing them out costs nothing, small enough to share well.
 constexpr std::size_t rays_per_run = 1024;
 // Rays in flight where the caller leaves the choice: `python -m bench inflight` measures it.
-constexpr unsigned usual_in_flight = 32;
+constexpr unsigned usual_in_flight = 24;
 // Fewer rays than this are traced one by one: filling and draining the flights would take most of the time.
 constexpr std::size_t fewest_in_flight = 16;
 
