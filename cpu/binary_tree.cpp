@@ -6,106 +6,15 @@
 #include <numeric>
 #include <vector>
 
+#include "binned_split.h"
 #include "collapse.h"
 #include "parallel.h"
 
 namespace wive {
 namespace {
 
-constexpr int max_bins = 32;
 constexpr std::size_t chunk_size = 1 << 14;            // references per step of a parallel split
 constexpr std::uint32_t parallel_range = 1 << 17;      // larger ranges are split by all threads together
-
-typedef std::int32_t Int4v __attribute__((vector_size(16)));
-
-struct Range {
-    std::uint32_t begin, end;
-    int depth;
-    Box box, centroids;
-    std::uint32_t size() const { return end - begin; }
-};
-
-// Maps a centroid to its bin on each axis. Small ranges get few bins, as in Embree.
-struct BinMap {
-    Float4v base, scale;
-    int count;
-
-    explicit BinMap(const Range& range)
-        : base(range.centroids.lo),
-          scale{},
-          count(static_cast<int>(std::min<float>(max_bins, 4.0f + 0.05f * static_cast<float>(range.size())))) {
-        const Float4v extent = range.centroids.hi - range.centroids.lo;
-        for (int axis = 0; axis < 3; ++axis)
-            if (extent[axis] > 1e-34f) scale[axis] = 0.9999f * static_cast<float>(count) / extent[axis];
-    }
-    Int4v operator()(Float4v centroid) const {
-        return __builtin_convertvector((centroid - base) * scale, Int4v);
-    }
-};
-
-struct Bins {
-    Box box[3][max_bins];
-    std::uint32_t count[3][max_bins];
-
-    explicit Bins(int bins) {
-        for (int axis = 0; axis < 3; ++axis)
-            for (int i = 0; i < bins; ++i) {
-                box[axis][i] = Box{};
-                count[axis][i] = 0;
-            }
-    }
-    void add(const PrimRef* refs, std::size_t begin, std::size_t end, const BinMap& bin_of) {
-        for (std::size_t i = begin; i < end; ++i) {
-            const Int4v bin = bin_of(refs[i].centroid());
-            const Box prim = refs[i].box();
-            for (int axis = 0; axis < 3; ++axis) {
-                box[axis][bin[axis]].grow(prim);
-                ++count[axis][bin[axis]];
-            }
-        }
-    }
-    void add(const Bins& other, int bins) {
-        for (int axis = 0; axis < 3; ++axis)
-            for (int i = 0; i < bins; ++i) {
-                box[axis][i].grow(other.box[axis][i]);
-                count[axis][i] += other.count[axis][i];
-            }
-    }
-};
-
-struct Split {
-    int axis = -1;  // -1: no plane separates the centroids, halve the range
-    int bin = 0;    // bins below go left
-};
-
-Split best_split(const Bins& bins, const BinMap& bin_of) {
-    Split best;
-    float best_cost = std::numeric_limits<float>::infinity();
-    for (int axis = 0; axis < 3; ++axis) {
-        if (!(bin_of.scale[axis] > 0)) continue;
-        float right_cost[max_bins];
-        Box right;
-        std::uint32_t count = 0;
-        for (int i = bin_of.count - 1; i > 0; --i) {
-            right.grow(bins.box[axis][i]);
-            count += bins.count[axis][i];
-            right_cost[i] = count > 0 ? right.half_area() * static_cast<float>(blocks_for(count)) : -1.0f;
-        }
-        Box left;
-        count = 0;
-        for (int i = 1; i < bin_of.count; ++i) {
-            left.grow(bins.box[axis][i - 1]);
-            count += bins.count[axis][i - 1];
-            if (count == 0 || right_cost[i] < 0) continue;
-            const float cost = left.half_area() * static_cast<float>(blocks_for(count)) + right_cost[i];
-            if (cost < best_cost) {
-                best_cost = cost;
-                best = {axis, i};
-            }
-        }
-    }
-    return best;
-}
 
 struct Halves {
     Range left, right;

@@ -1,8 +1,10 @@
-// Four floats, and the four doubles they widen to, shared by the AVX2 and the AVX-512 files. Every function is always inlined,
+// Four and eight floats and four doubles: what the AVX2 and the AVX-512 files share. Every function is always inlined,
 // so no copy compiled for one instruction set can be linked into another.
 #pragma once
 
 #include <immintrin.h>
+
+#include <cstdint>
 
 #define WIVE_INLINE [[gnu::always_inline]] inline
 
@@ -76,6 +78,29 @@ struct AvxHits {
     WIVE_INLINE unsigned count() const {
         return static_cast<unsigned>(_mm_popcnt_u32(static_cast<unsigned>(_mm256_movemask_ps(v))));
     }
+};
+
+struct AvxFloat8 {
+    __m256 v;
+
+    WIVE_INLINE static AvxFloat8 load(const float* p) { return {_mm256_load_ps(p)}; }
+    WIVE_INLINE static AvxFloat8 all(float x) { return {_mm256_set1_ps(x)}; }
+    WIVE_INLINE friend AvxFloat8 multiply_add(AvxFloat8 a, AvxFloat8 b, AvxFloat8 c) {
+        return {_mm256_fmadd_ps(a.v, b.v, c.v)};
+    }
+    WIVE_INLINE friend AvxFloat8 min(AvxFloat8 a, AvxFloat8 b) { return {_mm256_min_ps(a.v, b.v)}; }
+    WIVE_INLINE friend AvxFloat8 max(AvxFloat8 a, AvxFloat8 b) { return {_mm256_max_ps(a.v, b.v)}; }
+    WIVE_INLINE friend AvxHits hits(AvxFloat8 tnear, AvxFloat8 tfar) {
+        return {_mm256_cmp_ps(tnear.v, tfar.v, _CMP_LE_OQ)};
+    }
+};
+
+// Slots in an octant's order. A permute reads the low three bits of an index, so nothing need be masked.
+struct AvxOrder {
+    __m256i slots;
+    WIVE_INLINE AvxOrder(const std::uint32_t* row, unsigned shift)
+        : slots(_mm256_srl_epi32(_mm256_load_si256(reinterpret_cast<const __m256i*>(row)),
+                                 _mm_cvtsi32_si128(static_cast<int>(shift)))) {}
 };
 
 // The child in the last lane that was hit, of at least one. It goes through memory, where it was stored before the

@@ -1,0 +1,29 @@
+// Writing the tree that was decided: wide nodes and triangle blocks.
+#pragma once
+
+#include <array>
+#include <cstddef>
+
+#include "binary_tree.h"
+#include "builder.h"
+#include "large_array.h"
+#include "mesh.h"
+
+namespace wive {
+
+struct EmittedTree {
+    LargeArray<std::byte> units;
+    std::size_t node_count, block_count;
+    int depth;
+};
+
+// Children of a node stand side by side, then subtree after subtree; the same on any number of threads. Throws
+// std::invalid_argument where the tree is larger than child references reach.
+EmittedTree emit_tree(const BinaryTree& tree, const Mesh& mesh, const BuildOptions& options,
+                      const std::array<float, 3>& center, unsigned threads);
+
+// Planes relative to the centre, rounded outwards so that a box never shrinks.
+float plane_below(float plane, float center);
+float plane_above(float plane, float center);
+
+}  // namespace wive
