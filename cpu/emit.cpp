@@ -178,12 +178,8 @@ private:
         }
         const SlotSequences order = options_.order == ChildOrder::treelet    ? treelet.order
                                     : options_.order == ChildOrder::diagonal ? sort_along_diagonals(node, treelet.count)
-                                                                             : slots_in_turn(treelet.count);
+                                                                             : shuffle(node, treelet.count);
         write_order(node, order, treelet.count);
-    }
-
-    static SlotSequences slots_in_turn(int count) {
-        return single_slot(count < node_width ? 0x76543210u & ((1u << 4 * count) - 1) : 0x76543210u);
     }
 
     std::uint32_t write_leaf(const Slot& slot, Size& cursor) const {

@@ -1,6 +1,10 @@
 #include "order.h"
 
 #include <algorithm>
+#include <bit>
+#include <numeric>
+
+#include "random.h"
 
 namespace wive {
 
@@ -14,22 +18,44 @@ SlotSequences join(const SlotSequences& left, int left_count, const SlotSequence
     return joined;
 }
 
+namespace {
+
+// The slots by rising key.
+template <class Key>
+std::uint32_t sort_slots(const std::array<Key, node_width>& key, int children) {
+    std::array<std::uint32_t, node_width> slots;
+    std::iota(slots.begin(), slots.end(), 0u);
+    std::stable_sort(slots.begin(), slots.begin() + children,
+                     [&](std::uint32_t a, std::uint32_t b) { return key[a] < key[b]; });
+    std::uint32_t sequence = 0;
+    for (int i = 0; i < children; ++i) sequence |= slots[static_cast<std::size_t>(i)] << 4 * i;
+    return sequence;
+}
+
+}  // namespace
+
 SlotSequences sort_along_diagonals(const Node& node, int children) {
-    SlotSequences sequences{};
+    SlotSequences sequences;
     for (unsigned octant = 0; octant < 8; ++octant) {
         std::array<float, node_width> key{};
-        std::array<std::uint32_t, node_width> slots{};
-        for (int i = 0; i < children; ++i) {
-            slots[static_cast<std::size_t>(i)] = static_cast<std::uint32_t>(i);
+        for (int i = 0; i < children; ++i)
             for (int axis = 0; axis < 3; ++axis) {
                 const float centre = node.planes[2 * axis][i] + node.planes[2 * axis + 1][i];
                 key[static_cast<std::size_t>(i)] += (octant >> axis & 1u) ? -centre : centre;
             }
-        }
-        std::stable_sort(slots.begin(), slots.begin() + children,
-                         [&](std::uint32_t a, std::uint32_t b) { return key[a] < key[b]; });
-        for (int i = 0; i < children; ++i) sequences[octant] |= slots[static_cast<std::size_t>(i)] << 4 * i;
+        sequences[octant] = sort_slots(key, children);
     }
+    return sequences;
+}
+
+SlotSequences shuffle(const Node& node, int children) {
+    std::array<std::uint32_t, node_width> key{};
+    for (int i = 0; i < children; ++i) {
+        const auto bits = [&](int row) { return std::bit_cast<std::uint32_t>(node.planes[row][i]); };
+        key[static_cast<std::size_t>(i)] = pcg4d(bits(0), bits(2), bits(4), static_cast<std::uint32_t>(i))[0];
+    }
+    SlotSequences sequences;
+    sequences.fill(sort_slots(key, children));
     return sequences;
 }
 

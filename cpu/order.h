@@ -9,7 +9,8 @@
 namespace wive {
 
 // treelet: a depth-first walk of the binary treelet that swaps sides where the ray is negative on the split axis
-// (the paper's). diagonal: children sorted along the octant's diagonal. none: by slot, for comparison.
+// (the paper's). diagonal: children sorted along the octant's diagonal. none: shuffled, the same for every octant; what
+// having no order costs.
 enum class ChildOrder { treelet, diagonal, none };
 
 // For each octant, slots from front to back, four bits each, the first in the lowest bits.
@@ -26,6 +27,9 @@ SlotSequences join(const SlotSequences& left, int left_count, const SlotSequence
 
 // Slots sorted by their boxes' centres along each octant's diagonal.
 SlotSequences sort_along_diagonals(const Node& node, int children);
+
+// Slots in an order that has nothing to do with where they are. (By slot would be octant 0's own order.)
+SlotSequences shuffle(const Node& node, int children);
 
 // Writes the node's order row: lane i gets the i-th slot of every octant. Empty slots come last.
 void write_order(Node& node, SlotSequences sequences, int children);
