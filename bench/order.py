@@ -2,7 +2,7 @@
 
 Redoes the comparison of WiVe (Fuetterling et al., HPG 2017). `treelet` is the paper's order, from the split
 axes of the treelet behind each node and the signs of the ray; `diagonal` sorts children along the diagonal of
-the ray's octant; `none` takes them as stored; `distance` sorts the children hit by their true entry
+the ray's octant; `none` shuffles them; `distance` sorts the children hit by their true entry
 distance, the work that the others spare. Closest hits only: for any-hit queries order matters little.
 `other_hits` counts rays whose t differs from that of the distance order (rounding at the face of a box).
 """
