@@ -54,11 +54,12 @@ SlotCosts gather_costs(BinaryNode& node, const Box& box, const SlotCosts& left, 
     }
     node.share[0] = node.share[node_width];
     const std::uint32_t blocks = blocks_for(node.end - node.begin);
-    const float leaf = blocks <= max_leaf_blocks ? area * block_cost * static_cast<float>(blocks)
-                                                 : std::numeric_limits<float>::infinity();
+    const float leaf = area * block_cost * static_cast<float>(blocks);
     const float wide = area * node_cost + shared[node_width];
-    node.share[1] = leaf <= wide ? as_leaf : as_wide_node;
-    costs[1] = leaf <= wide ? leaf : wide;
+    // The limit is asked apart from the costs, which are infinite both where coordinates are very large.
+    const bool as_one = blocks <= max_leaf_blocks && leaf <= wide;
+    node.share[1] = as_one ? as_leaf : as_wide_node;
+    costs[1] = as_one ? leaf : wide;
     for (std::size_t i = 2; i <= node_width; ++i) {
         if (shared[i] < costs[i - 1]) {
             costs[i] = shared[i];

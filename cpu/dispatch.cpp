@@ -2,12 +2,21 @@
 
 #include <stdexcept>
 
+#if defined(__x86_64__)
+#include <cpuid.h>
+#endif
+
 namespace wive {
 namespace {
 
 #if defined(__x86_64__)
+bool has_lzcnt() {  // no name for __builtin_cpu_supports in every compiler; without it lzcnt would run as bsr
+    unsigned a = 0, b = 0, c = 0, d = 0;
+    return __get_cpuid(0x80000001u, &a, &b, &c, &d) != 0 && (c >> 5 & 1u) != 0;
+}
 bool has_avx2() {
-    return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") && __builtin_cpu_supports("bmi2");
+    return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") && __builtin_cpu_supports("bmi") &&
+           __builtin_cpu_supports("bmi2") && __builtin_cpu_supports("popcnt") && has_lzcnt();
 }
 bool has_avx512() {
     return has_avx2() && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl") &&
@@ -26,7 +35,7 @@ struct Entry {
 };
 
 std::vector<Entry> entries() {
-    constexpr std::string_view avx512 = "AVX-512 F, VL, DQ and BW", avx2 = "AVX2, FMA and BMI2";
+    constexpr std::string_view avx512 = "AVX-512 F, VL, DQ or BW", avx2 = "AVX2, FMA, BMI1, BMI2, LZCNT or POPCNT";
     return {{"avx512", avx512_full_kernels(), has_avx512(), avx512},
             {"avx512.full", avx512_full_kernels(), has_avx512(), avx512},
             {"avx512.half", avx512_half_kernels(), has_avx512(), avx512},

@@ -22,7 +22,7 @@ int sign_of_sum(const std::array<double, count>& terms) {
             const double error = (a - (sum - b_part)) + (b - b_part);  // Knuth's two-sum
             if (error != 0) expansion[kept++] = error;
         }
-        expansion[kept++] = sum;
+        if (sum != 0 || kept == 0) expansion[kept++] = sum;
         size = kept;
     }
     const double largest = expansion[size - 1];

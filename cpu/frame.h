@@ -23,8 +23,8 @@ namespace wive {
 // and the triangle test (triangle_watertight.h) moves a vertex sideways by at most 6u max(P + O). All of it is
 // below 12u M, M = max over the axes of (P + O); slack = |r| 16u M covers it. The near distance is lowered and the far
 // distance raised by it, so no box that holds a triangle the test accepts is ever missed.
-// A component smaller than 2^-30 counts as 2^-30 with its sign: along the ray that moves a point by less than
-// 2^-29 M, which the same slack covers.
+// A component smaller than 2^-30 of the longest counts as that, with its sign: along the ray that moves a point by
+// less than 2^-29 M, which the same slack covers. (A subnormal direction stays shorter than 1 when scaled.)
 template <class Isa>
 struct RayFrame {
     using Float4 = typename Isa::Float4;
@@ -61,10 +61,12 @@ struct RayFrame {
         tmin = caller_tmin * unscale;
         tmax = caller_tmax * unscale;
 
-        constexpr float smallest = 0x1p-30f, slack_factor = 0x1p-20f;
+        constexpr float smallest_part = 0x1p-30f, slack_factor = 0x1p-20f;
+        constexpr float least_reach = 0x1p-100f;  // keeps the slack from vanishing where everything is tiny
         const Float4 scaled = caller_direction * Float4::all(scale);
         const Float4 relative = caller_origin - Float4::load(bvh.center);
-        const float reach = highest_lane(Float4::load(bvh.extent) + abs(relative));
+        const float reach = highest_lane(Float4::load(bvh.extent) + abs(relative)) + least_reach;
+        const float smallest = longest * scale * smallest_part;
         const Float4 size = Float4::all(1.0f) / max(abs(scaled), Float4::all(smallest));
         const Float4 reciprocal = flip_sign(size, scaled);
         const Float4 distance = relative * reciprocal, slack = size * Float4::all(reach * slack_factor);

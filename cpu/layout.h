@@ -69,7 +69,7 @@ struct BvhView {
     }
 };
 
-// Coordinates beyond this are refused: products of three of them must stay finite in double, of two in float.
+// Coordinates beyond this are refused: products of two of them must stay finite in float.
 inline constexpr float max_coordinate = 1e18f;
 
 }  // namespace wive

@@ -57,6 +57,8 @@ bool has_no_area(const float* a, const float* b, const float* c) {
 }  // namespace
 
 void check_mesh(const Mesh& mesh, unsigned threads) {
+    if (mesh.vertex_count > std::numeric_limits<std::int32_t>::max())
+        throw std::invalid_argument("vertices: expected at most 2147483647, split the mesh into several scenes");
     const auto bad_vertex = [&](std::size_t i) {
         for (int k = 0; k < 3; ++k)
             if (!(std::abs(mesh.vertices[3 * i + static_cast<std::size_t>(k)]) <= max_coordinate)) return true;

@@ -5,7 +5,6 @@
 #include <atomic>
 #include <cstddef>
 #include <exception>
-#include <system_error>
 #include <thread>
 #include <vector>
 
@@ -35,7 +34,7 @@ void parallel_for(std::size_t count, unsigned threads, const Work& work) {
     pool.reserve(helpers);
     try {
         while (pool.size() < helpers) pool.emplace_back(run);
-    } catch (const std::system_error&) {
+    } catch (...) {
         // The machine has no more threads to give: the ones we have do the work.
     }
     run();

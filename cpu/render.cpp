@@ -135,7 +135,7 @@ private:
             const auto prim = static_cast<std::size_t>(prim_[i]);
             const Vec3 a = load_vec3(job_.mesh.corner(prim, 0)), b = load_vec3(job_.mesh.corner(prim, 1)),
                        c = load_vec3(job_.mesh.corner(prim, 2));
-            const Vec3 normal = normalize(cross(b - a, c - a));
+            const Vec3 normal = unit_normal(a, b, c);
             if (job_.albedo == Albedo::normals)
                 path.throughput = path.throughput * (normal * 0.5f + Vec3{0.5f, 0.5f, 0.5f});
             else

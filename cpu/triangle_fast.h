@@ -34,7 +34,8 @@ public:
         unsigned lanes = less_equal(zero, u) & less_equal(zero, v) & less_equal(u + v, size) & ~less_equal(size, zero);
         if (lanes == 0) [[likely]] return false;
         alignas(16) float ts[4], us[4], vs[4];
-        (flip_sign(dot(e2, q), det) / size).store(ts);
+        for (Float4& component : q) component = component / size;  // first: the product of three lengths may overflow
+        flip_sign(dot(e2, q), det).store(ts);
         (u / size).store(us);
         (v / size).store(vs);
         for (; lanes != 0; lanes &= lanes - 1) {

@@ -63,7 +63,8 @@ public:
 
 private:
     // t, u and v in double, rounded once. The plane across the ray is scaled by the direction's longest component,
-    // which spares the divisions. Weights are clamped to the sides that were decided, so t stays within the triangle.
+    // which spares the divisions. Where only the rounding of the corners let the ray in, a weight is on the wrong side
+    // here: there the rounded triangle is what is hit, and t lies where its boxes are looked for.
     [[gnu::always_inline]] void intersect(const TriangleBlock& block, unsigned lanes, Float4 side, float (&ts)[4],
                                           float (&us)[4], float (&vs)[4]) const {
         const Double4 forward = Double4::all(ray_.direction[axis_[2]]);
@@ -80,16 +81,18 @@ private:
         const Double4 sides = widen(side), zero = Double4::all(0.0);
         for (int k = 0; k < 3; ++k) {
             const int i = (k + 2) % 3, j = (k + 1) % 3;
-            weight[k] = max(flip_sign(x[i] * y[j] - y[i] * x[j], sides), zero);
+            weight[k] = flip_sign(x[i] * y[j] - y[i] * x[j], sides);
         }
         const Double4 det = weight[0] + weight[1] + weight[2];
+        const Double4 lowest = min(min(weight[0], weight[1]), weight[2]);
         const Double4 inverse = Double4::all(1.0) / det;
         const Double4 height = weight[0] * z[0] + weight[1] * z[1] + weight[2] * z[2];
         Float4::narrow(height / (det * forward)).store(ts);
         Float4::narrow(weight[1] * inverse).store(us);
         Float4::narrow(weight[2] * inverse).store(vs);
-        if (const unsigned edge_on = lanes & less_equal(det, zero); edge_on != 0) [[unlikely]]
-            intersect_edge_on(block, edge_on, ts, us, vs);
+        const unsigned inside = less_equal(zero, lowest) & ~less_equal(det, zero);
+        if (const unsigned rounded = lanes & ~inside; rounded != 0) [[unlikely]]
+            intersect_rounded(block, rounded, ts, us, vs);
     }
 
     // Decides the lanes in which rounding hid a sign; returns the lanes that remain.
@@ -109,8 +112,8 @@ private:
         return lanes;
     }
 
-    // A triangle that only the rounding of its vertices turned towards the ray: it is hit where the rounded one is.
-    [[gnu::noinline]] void intersect_edge_on(const TriangleBlock& block, unsigned lanes, float (&ts)[4], float (&us)[4],
+    // The same for the triangle with rounded corners.
+    [[gnu::noinline]] void intersect_rounded(const TriangleBlock& block, unsigned lanes, float (&ts)[4], float (&us)[4],
                                              float (&vs)[4]) const {
         for (; lanes != 0; lanes &= lanes - 1) {
             const int lane = __builtin_ctz(lanes);

@@ -162,3 +162,17 @@ def test_without_order_every_octant_has_one_and_the_same_shuffled_sequence() -> 
     assert all(np.array_equal(sequence, sequences[0]) for sequence in sequences)
     assert (np.sort(sequences[0], axis=1) == np.arange(8)).all()
     assert (sequences[0] != np.arange(8)).any()
+
+
+def test_the_largest_coordinates_make_a_sound_tree() -> None:
+    random = np.random.default_rng(8)
+    vertices = random.uniform(-9.9e17, 9.9e17, (6000, 3)).astype(np.float32)
+    bvh = _cpu.Bvh(vertices, np.arange(6000, dtype=np.int32).reshape(-1, 3))
+    prims = bvh.blocks[:, 9].view(np.int32)
+    assert sorted(prims[prims >= 0]) == list(range(2000))
+
+
+def test_a_sliver_that_is_not_quite_degenerate_is_kept_in_any_rotation() -> None:
+    vertices = np.float32([[1, 0, 0], [1e-20, 1, 0], [2e-20, 1, 0]])
+    for face in ([0, 1, 2], [1, 2, 0], [2, 0, 1]):
+        assert (_cpu.Bvh(vertices, np.int32([face])).blocks[:, 9].view(np.int32) >= 0).sum() == 1

@@ -165,3 +165,31 @@ def test_t_is_the_nearest_float_to_the_exact_distance(backend: str) -> None:
     hits = wive.Scene(vertices, faces, backend=backend).intersect(np.zeros_like(directions), directions)
     exact = (3.0 / directions[:, 2].astype(np.float64)).astype(np.float32)
     assert np.array_equal(hits.t, exact)
+
+
+@pytest.mark.parametrize("length", [1e38, 1e-30, 1e-40, 1e-42, 1.4e-45])
+def test_directions_of_any_length_hit_a_wall(backend: str, length: float) -> None:
+    vertices, faces = grid(64)
+    random = np.random.default_rng(9)
+    origins = np.append(np.full((2000, 1), 30.0), random.uniform(0, 64, (2000, 2)), axis=1).astype(np.float32)
+    directions = np.zeros_like(origins)
+    directions[:, 0] = length
+    scene = wive.Scene(vertices, faces, backend=backend)
+    assert scene.intersect(origins, directions).mask.all()
+    assert scene.occluded(origins, directions).all()
+
+
+def test_a_hit_is_found_again_with_tmax_at_its_own_distance(backend: str) -> None:
+    # Nearly coplanar triangles, rays nearly in their plane: t is as sensitive as it gets.
+    random = np.random.default_rng(10)
+    across = np.linalg.qr(np.array([[1.0, 0.7, 0.3], [0, 1, 0], [0, 0, 1]]).T)[0].T
+    flat = np.append(random.uniform(-1, 1, (1200, 2)), 3e-7 * random.standard_normal((1200, 1)), axis=1)
+    vertices = (flat @ np.stack([across[1], across[2], across[0]])).astype(np.float32)
+    scene = wive.Scene(vertices, np.arange(1200, dtype=np.int32).reshape(-1, 3), backend=backend)
+    ends = np.append(random.uniform(-2, 2, (2, 50_000, 2)), 1e-6 * random.standard_normal((2, 50_000, 1)), axis=2)
+    points = (ends @ np.stack([across[1], across[2], across[0]])).astype(np.float32)
+    origins, directions = points[0], points[1] - points[0]
+    hits = scene.intersect(origins, directions)
+    found = hits.mask
+    assert found.sum() > 10_000
+    assert scene.occluded(origins[found], directions[found], tmin=0.0, tmax=hits.t[found]).all()
