@@ -81,7 +81,7 @@ private:
         const Double4 sides = widen(side), zero = Double4::all(0.0);
         for (int k = 0; k < 3; ++k) {
             const int i = (k + 2) % 3, j = (k + 1) % 3;
-            weight[k] = flip_sign(x[i] * y[j] - y[i] * x[j], sides);
+            weight[k] = flip_sign(x[i] * y[j] - y[i] * x[j], sides) + zero;  // no -0
         }
         const Double4 det = weight[0] + weight[1] + weight[2];
         const Double4 lowest = min(min(weight[0], weight[1]), weight[2]);

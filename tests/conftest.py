@@ -1,4 +1,8 @@
-"""Fixtures for every test: `backend` runs it on each one there is, `scenes` loads large meshes."""
+"""Fixtures for every test: `backend` runs it on each one there is, `scenes` loads large meshes.
+
+`pytest --device cuda:0`, or WIVE_TEST_DEVICE=cuda:0, runs the tests of backend "warp" on that device; one
+that can't be used ends the run with the reason. Without it they run on Warp's CPU device.
+"""
 
 import os
 from collections.abc import Callable
@@ -8,15 +12,36 @@ import numpy as np
 import pytest
 
 import wive
+from wive import devices
 
 SCENES = Path(__file__).resolve().parents[2] / "shared" / "scenes"
 BACKENDS = wive.backends()
+
+DEVICE = pytest.StashKey[str]()
 
 Mesh = tuple[np.ndarray, np.ndarray]
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--slow", action="store_true", help="run the tests that take minutes, too")
+    parser.addoption(
+        "--device",
+        default=os.environ.get("WIVE_TEST_DEVICE"),
+        help='Warp device for the tests of backend "warp"; default: $WIVE_TEST_DEVICE, else cpu',
+    )
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Make the chosen device the default one of backend "warp"."""
+    device = config.getoption("--device")
+    if device is not None:
+        try:
+            _, device = wive.backend.resolve_backend("warp", device)
+        except ValueError as error:
+            raise pytest.UsageError(f"--device: {error}") from None
+    found = devices.warp_devices
+    chosen = config.stash[DEVICE] = device or "cpu"
+    devices.warp_devices = lambda: {chosen: found()[chosen], **found()}
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
@@ -33,6 +58,14 @@ def backend(request: pytest.FixtureRequest) -> str:
     if not BACKENDS[name].usable:
         pytest.skip(f"{name}: {BACKENDS[name].reason}")
     return name
+
+
+@pytest.fixture(scope="session")
+def device(pytestconfig: pytest.Config) -> str:
+    """The Warp device that tests run on; skips where there is no Warp."""
+    if not BACKENDS["warp"].usable:
+        pytest.skip(f"warp: {BACKENDS['warp'].reason}")
+    return pytestconfig.stash[DEVICE]
 
 
 @pytest.fixture(scope="session")

@@ -234,9 +234,24 @@ def test_stats_count_work_and_change_no_hit(backend):
     assert (closest.leaves[hits.mask] >= 1).all()
     assert (closest.triangles[hits.mask] >= 1).all()
     assert closest.triangles.mean() < 0.1 * len(scene)
-    for fewer, more in zip(any_hit, closest, strict=True):
-        assert (fewer <= more).all()
-        assert fewer.sum() < more.sum()
+    missed = ~hits.mask
+    assert missed.any()
+    for of_any, of_closest in zip(any_hit, closest, strict=True):
+        # Without a hit both visit all there is in the interval, in whatever order.
+        np.testing.assert_array_equal(of_any[missed], of_closest[missed])
+        assert (of_any[hits.mask] >= 1).all()
+
+
+def test_occluded_stops_at_the_first_hit(backend):
+    layers = 1000
+    vertices = np.concatenate([TRIANGLE[0] + np.float32([0, 0, z]) for z in range(layers)])
+    faces = np.arange(3 * layers).reshape(-1, 3)
+    blocked, stats = wive.Scene(vertices, faces, backend=backend).occluded(
+        [0.25, 0.25, 0], [0, 0, 1], stats=True
+    )
+    assert blocked.all()
+    assert stats.triangles[0] < 0.05 * layers
+    assert stats.inner_nodes[0] < 20
 
 
 def test_a_scene_tells_its_size_bounds_and_options(backend):
@@ -252,7 +267,7 @@ def test_a_scene_tells_its_size_bounds_and_options(backend):
 
 def test_auto_is_the_first_usable_backend(usable_backends):
     assert wive.Scene(*TRIANGLE).backend == usable_backends[0]
-    assert usable_backends[-1] == "scalar"
+    assert [name for name in usable_backends if name != "warp"][-1] == "scalar"
 
 
 def test_backends_say_why_they_are_not_usable():
@@ -261,4 +276,4 @@ def test_backends_say_why_they_are_not_usable():
     for backend in found.values():
         assert backend.usable == (backend.reason == "")
         assert "\n" not in backend.reason
-    assert not found["warp"].usable
+    assert not any(found[name].devices for name in ("avx512", "avx2", "scalar"))

@@ -1,6 +1,7 @@
 """Bad input ends in one line: the argument, what was expected, what came."""
 
 import pickle
+import sys
 
 import numpy as np
 import pytest
@@ -128,9 +129,15 @@ def test_a_vertex_that_is_no_place_is_named_by_its_index(value, dtype):
             "nodes must be one of float32 in this version of wive, got 'compressed'",
         ),
         (
-            {"device": "cuda:0"},
+            {"device": "cuda:0", "backend": "scalar"},
             ValueError,
-            "device must be None in this version of wive: CPU backends have none, got 'cuda:0'",
+            "device is only for backend 'warp', got device 'cuda:0' with backend 'scalar': "
+            "leave one of them out",
+        ),
+        (
+            {"device": 0},
+            TypeError,
+            "device must be a name such as 'cpu' or 'cuda:0', got 0",
         ),
     ],
 )
@@ -140,6 +147,12 @@ def test_bad_options(options, kind, expected):
     assert message(error) == expected
 
 
+@pytest.fixture
+def no_warp(monkeypatch):
+    monkeypatch.setitem(sys.modules, "warp", None)
+
+
+@pytest.mark.usefixtures("no_warp")
 def test_a_backend_that_cannot_run_here_says_why_and_which_can(monkeypatch):
     monkeypatch.setattr(
         wive._cpu, "kernels", lambda: {"avx512": "this CPU lacks AVX-512", "avx2": "", "scalar": ""}
@@ -156,6 +169,7 @@ def test_a_backend_that_cannot_run_here_says_why_and_which_can(monkeypatch):
         wive.Scene(VERTICES, FACES, backend="avx2")
 
 
+@pytest.mark.usefixtures("no_warp")
 def test_a_scene_saved_elsewhere_needs_its_backend_here_unless_it_was_auto(monkeypatch, tmp_path):
     wive.Scene(VERTICES, FACES).save(tmp_path / "auto")
     wive.Scene(VERTICES, FACES, backend="scalar").save(tmp_path / "scalar")
@@ -222,6 +236,13 @@ def test_a_scene_saved_elsewhere_needs_its_backend_here_unless_it_was_auto(monke
         ((ORIGINS, ORIGINS), {"threads": 0}, ValueError, "threads must be from 1 to 2147483647, got 0"),
         ((ORIGINS, ORIGINS), {"threads": 1.5}, TypeError, "threads must be an integer, got float 1.5"),
         ((ORIGINS, ORIGINS), {"in_flight": -1}, ValueError, "in_flight must be from 1 to 2147483647, got -1"),
+        ((ORIGINS, ORIGINS), {"lanes": 4}, ValueError, "lanes must be one of auto, 8, 1, got 4"),
+        (
+            (ORIGINS, ORIGINS),
+            {"lanes": 8},
+            ValueError,
+            "lanes is only for backend 'warp', got 8 on a CPU backend: leave it out",
+        ),
     ],
 )
 def test_bad_rays(query, rays, options, kind, expected):

@@ -1,1 +1,42 @@
-"""The Warp backend's room: the same traversal as NVIDIA Warp kernels. Empty in this version."""
+"""The Warp backend: the tree that the C++ core built, traversed by NVIDIA Warp kernels, on CPU or CUDA.
+
+Launches over batches of rays (what `wive.Scene` uses):
+
+    tree = upload(bvh, device)                 # bvh: wive._cpu.Bvh, device: "cpu", "cuda:0", ...
+    launch_closest(tree, origins, directions, tmin, tmax, t, prim, uv)
+    launch_any(tree, origins, directions, tmin, tmax, occluded)
+    check(tree)                                # waits; raises where a kernel met a corrupt tree
+
+Functions for users' own kernels take `tree.handle`, whose type says the accuracy: `Bvh` for watertight trees,
+`FastBvh` for fast ones.
+
+    @wp.kernel
+    def shade(bvh: Bvh, origins: wp.array[wp.vec3], directions: wp.array[wp.vec3], depth: wp.array[float]):
+        i = wp.tid()
+        hit = closest_hit(bvh, origins[i], directions[i], 0.0, wp.inf)
+        depth[i] = hit.t
+
+Hits are those of the C++ backends, bit for bit: t is infinity, prim -1 and u, v NaN where a ray misses.
+"""
+
+from wive.warp_kernels.functions import any_hit, closest_hit
+from wive.warp_kernels.gradients import SurfaceHit, differentiable_hit
+from wive.warp_kernels.handle import Bvh, FastBvh, Hit
+from wive.warp_kernels.launch import launch_any, launch_closest
+from wive.warp_kernels.tree import CorruptTreeError, Tree, check, upload
+
+__all__ = [
+    "Bvh",
+    "CorruptTreeError",
+    "FastBvh",
+    "Hit",
+    "SurfaceHit",
+    "Tree",
+    "any_hit",
+    "check",
+    "closest_hit",
+    "differentiable_hit",
+    "launch_any",
+    "launch_closest",
+    "upload",
+]

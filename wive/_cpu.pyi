@@ -31,19 +31,21 @@ class Bvh:
     ) -> None:
         """Build over vertices (v,3), faces (f,3). threads 0 means every core.
 
-        Raises ValueError naming the first bad vertex (NaN, infinite or beyond 1e18) or face (index out of range).
+        Raises ValueError naming the first bad vertex (NaN, infinite or beyond 1e18) or face (index out of
+        range).
         """
     @property
     def nodes(self) -> NDArray[np.uint32]:
         """(m,8,8) read-only view, rows lo.x hi.x lo.y hi.y lo.z hi.z child order; planes are float32 bits."""
     @property
     def blocks(self) -> NDArray[np.uint32]:
-        """(b,10,4) read-only view: nine float32 rows (fast: v0 e1 e2; watertight: v0 v1 v2) and the prim row."""
+        """(b,10,4) read-only view: nine float32 rows (fast: v0 e1 e2; watertight: v0 v1 v2), the prim row."""
     @property
     def units(self) -> NDArray[np.uint32]:
         """(8 m + 5 b, 8) read-only view of all of it: nodes, then blocks, in units of 32 bytes.
 
-        A child reference holds (unit << 3); a leaf sets bit 31 and its number of blocks less one in the low 3 bits.
+        A child reference holds (unit << 3); a leaf sets bit 31 and its number of blocks less one in the low 3
+        bits.
         """
     @property
     def center(self) -> NDArray[np.float32]:
@@ -53,7 +55,7 @@ class Bvh:
         """(3,) the largest |plane| on each axis: the half size of the tree round its center."""
     @property
     def bounds(self) -> NDArray[np.float32]:
-        """(2,3) lowest and highest corner of the triangles that can be hit; inf, -inf where there are none."""
+        """(2,3) lowest and highest corner of the triangles that can be hit; inf, -inf without any."""
     @property
     def accuracy(self) -> str: ...
     @property
@@ -76,7 +78,7 @@ class Bvh:
         in_flight: int = 0,
         stats: bool = False,
     ) -> tuple[NDArray[np.float32], NDArray[np.int32], NDArray[np.float32], NDArray[np.int32] | None]:
-        """Closest hits: t (n,) inf on a miss, prim (n,) -1 on a miss, uv (n,2) NaN on a miss, stats (n,3) or None.
+        """Closest hits: t (n,), prim (n,), uv (n,2), and stats (n,3) or None; inf, -1 and NaN on a miss.
 
         tmin and tmax have one element or n. stats columns: inner nodes, leaves, triangles tested.
         The interpreter lock is released while rays are traced.
@@ -109,6 +111,7 @@ class Bvh:
         """Path-trace rows [row_begin, row_end) of image (height,width,3) in place; returns the rays traced.
 
         camera (4,3): eye, then the vectors from the eye to the picture's centre, from its centre to the right
-        edge's middle, and from its centre to the top edge's middle. Linear radiance under a white sky of radiance 1.
-        Random numbers come from (pixel, sample, bounce) alone, so a picture does not depend on threads or kernel.
+        edge's middle, and from its centre to the top edge's middle. Linear radiance under a white sky of
+        radiance 1. Random numbers come from (pixel, sample, bounce) alone, so a picture does not depend on
+        threads or kernel.
         """

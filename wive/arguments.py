@@ -2,17 +2,29 @@
 
 import operator
 from collections.abc import Iterable, Sequence
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 Float32 = NDArray[np.float32]
 Int32 = NDArray[np.int32]
+Lanes = Literal[1, 8]
 
 # More threads than this only cost memory; the core takes 32-bit counts.
 MOST_THREADS = 4096
 MOST_COUNT = 2**31 - 1
+FLOAT32 = np.dtype(np.float32)
+
+
+def _one(value: float) -> Float32:
+    array = np.array([value], np.float32)
+    array.flags.writeable = False
+    return array
+
+
+# The limits of most calls, made once: they are a third of the time that a call of one ray takes.
+COMMON_LIMITS = {value: _one(value) for value in (0.0, float("inf"))}
 
 
 def choice(name: str, value: object, allowed: Iterable[str]) -> None:
@@ -97,7 +109,7 @@ def rays(
         raise ValueError(
             f"origins and directions must be equally many, got {count} and {len(direction_rows)}"
         )
-    return origin_rows, direction_rows, _limits("tmin", tmin, count), _limits("tmax", tmax, count)
+    return origin_rows, direction_rows, limits("tmin", tmin, count), limits("tmax", tmax, count)
 
 
 def threads(value: int | None, available: int) -> int:
@@ -112,6 +124,36 @@ def in_flight(value: int | None) -> int:
     return 0 if value is None else integer("in_flight", value, 1)
 
 
+def work(
+    asked_threads: int | None, available: int, asked_in_flight: int | None, stats: bool
+) -> tuple[int, int, bool]:
+    """How the core is to trace: threads, rays in flight, whether to count."""
+    return threads(asked_threads, available), in_flight(asked_in_flight), bool(stats)
+
+
+def lanes(value: object, on_warp: bool) -> Lanes | None:
+    """8 or 1 lanes of a node a thread; None is "auto"."""
+    if value not in ("auto", 8, 1) or isinstance(value, bool):
+        raise ValueError(f"lanes must be one of auto, 8, 1, got {value!r}")
+    if value == "auto":
+        return None
+    if not on_warp:
+        raise ValueError(f"lanes is only for backend 'warp', got {value!r} on a CPU backend: leave it out")
+    return 8 if value == 8 else 1
+
+
+def limits(name: str, value: ArrayLike, count: int) -> Float32:
+    """The limits of `count` rays, (1,) or (count,) float32."""
+    if type(value) is float and value in COMMON_LIMITS:
+        return COMMON_LIMITS[value]
+    array = _numeric(name, value, "a real number or one per ray", "fiu")
+    if array.shape not in ((), (count,)):
+        raise ValueError(
+            f"{name} must be one number or have shape ({count},), one a ray, got shape {array.shape}"
+        )
+    return _float32(array.reshape(-1))
+
+
 def _vectors(name: str, value: ArrayLike) -> Float32:
     array = _numeric(name, value, "an (n, 3) array of real numbers", "fiu")
     if array.shape == (0,):
@@ -119,15 +161,6 @@ def _vectors(name: str, value: ArrayLike) -> Float32:
     if array.ndim not in (1, 2) or array.shape[-1] != 3:
         raise ValueError(f"{name} must have shape (n, 3), or (3,) if all rays share it, got {array.shape}")
     return _float32(array)
-
-
-def _limits(name: str, value: ArrayLike, count: int) -> Float32:
-    array = _numeric(name, value, "a real number or one per ray", "fiu")
-    if array.shape not in ((), (count,)):
-        raise ValueError(
-            f"{name} must be one number or have shape ({count},), one a ray, got shape {array.shape}"
-        )
-    return _float32(array.reshape(-1))
 
 
 def _numeric(
@@ -143,6 +176,8 @@ def _numeric(
 
 
 def _float32(array: NDArray[Any]) -> Float32:
+    if array.dtype is FLOAT32 and array.flags.c_contiguous and array.flags.aligned:
+        return array
     with np.errstate(over="ignore"):
         return np.require(array, np.float32, ["C", "A"])
 

@@ -5,8 +5,10 @@ from dataclasses import dataclass
 
 from wive import _cpu
 from wive.arguments import choice
+from wive.devices import resolve_device, warp_devices, warp_problem
 
 CPU_BACKENDS = ("avx512", "avx2", "scalar")
+WARP = "warp"
 
 
 @dataclass(frozen=True)
@@ -16,6 +18,22 @@ class Backend:
     usable: bool
     reason: str = ""
 
+    @property
+    def devices(self) -> dict[str, "Backend"]:
+        """The backend's devices by name, each usable or not; none for CPU backends."""
+        return {}
+
+
+class WarpBackend(Backend):
+    """The backend that has devices; looking at them starts Warp."""
+
+    @property
+    def devices(self) -> dict[str, Backend]:
+        """Warp's devices by name; the first usable one is the default."""
+        if not self.usable:
+            return {}
+        return {name: Backend(not reason, reason) for name, reason in warp_devices().items()}
+
 
 def backends() -> dict[str, Backend]:
     """Every backend by name, best CPU backend first; `reason` is empty where `usable` is true."""
@@ -24,26 +42,37 @@ def backends() -> dict[str, Backend]:
     for name in CPU_BACKENDS:
         reason = kernels.get(name, "not compiled into this build of wive: it needs an x86-64 compiler")
         found[name] = Backend(usable=not reason, reason=reason)
-    found["warp"] = Backend(usable=False, reason="not part of this version of wive: choose a CPU backend")
+    reason = warp_problem()
+    found[WARP] = WarpBackend(usable=not reason, reason=reason)
     return found
 
 
-def resolve_backend(name: str) -> str:
-    """The usable backend meant by `name`; "auto" is the first usable one.
+def resolve_backend(name: str, device: str | None = None) -> tuple[str, str | None]:
+    """The usable backend and device meant; "auto" is the first usable CPU backend, and with a device Warp.
 
-    Raises ValueError where there is no such backend or this machine can't run it.
+    The device of a CPU backend is None. Raises ValueError or TypeError where there is no such backend or
+    device or this machine can't run it.
     """
     found = backends()
     usable = [candidate for candidate, backend in found.items() if backend.usable]
     choice("backend", name, ("auto", *found))
-    if name == "auto":
-        return usable[0]
+    if device is not None:
+        if not isinstance(device, str):
+            raise TypeError(f"device must be a name such as 'cpu' or 'cuda:0', got {device!r:.60}")
+        if name not in ("auto", WARP):
+            raise ValueError(
+                f"device is only for backend 'warp', got device {device!r} with backend {name!r}: "
+                "leave one of them out"
+            )
+        name = WARP
+    elif name == "auto":
+        name = usable[0]
     if name not in usable:
         raise ValueError(
             f"backend {name!r} can't run here ({found[name].reason}); "
             f"choose one of {', '.join(['auto', *usable])}"
         )
-    return name
+    return name, resolve_device(device) if name == WARP else None
 
 
 def available_threads() -> int:

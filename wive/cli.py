@@ -7,7 +7,7 @@ from typing import NoReturn
 
 import wive
 from wive import commands
-from wive.backend import CPU_BACKENDS
+from wive.backend import CPU_BACKENDS, WARP
 from wive.rendering import ALBEDOS, Settings
 
 BAD_INPUT = 2
@@ -45,7 +45,9 @@ def _parser() -> argparse.ArgumentParser:
     _add_render(subparsers)
     _add_trace(subparsers)
     _add_info(subparsers)
-    backends = subparsers.add_parser("backends", help="list the backends and which can run here")
+    backends = subparsers.add_parser(
+        "backends", help="list the backends and devices, and which can be used here"
+    )
     backends.set_defaults(run=commands.list_backends)
     return parser
 
@@ -117,8 +119,8 @@ def _add_info(subparsers: "argparse._SubParsersAction[_Parser]") -> None:
 
 
 def _add_scene_options(parser: argparse.ArgumentParser, threads: bool = True) -> None:
-    parser.add_argument("--backend", default="auto", help=f"auto, {', '.join(CPU_BACKENDS)}")
-    parser.add_argument("--device", help="for backends with devices; CPU backends have none")
+    parser.add_argument("--backend", default="auto", help=f"auto, {', '.join(CPU_BACKENDS)}, {WARP}")
+    parser.add_argument("--device", help="Warp device such as cuda:0 or cpu; implies --backend warp")
     parser.add_argument("--accuracy", default="watertight", help="fast or watertight")
     if threads:
         parser.add_argument("--threads", type=int, help="default: every core")

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wive.arguments import rays as checked_rays
-from wive.backend import backends
+from wive.backend import Backend, backends
 from wive.camera import Camera
 from wive.files import atomic_write, check_output
 from wive.meshfile import load_mesh
@@ -34,7 +34,7 @@ def render_picture(options: Namespace) -> None:
     image, rays = render_counted(scene, camera, settings, progress=True)
     seconds = time.perf_counter() - begin
     write_png(output, image)
-    print(f"{output}: {_rate(rays, seconds)}, {scene.backend}, {len(scene):,} triangles")
+    print(f"{output}: {_rate(rays, seconds)}, {_tracer(scene)}, {len(scene):,} triangles")
 
 
 def trace_rays(options: Namespace) -> None:
@@ -63,7 +63,7 @@ def trace_rays(options: Namespace) -> None:
     seconds = time.perf_counter() - begin
     with atomic_write(output) as file:
         np.savez(file, t=t, prim=prim, uv=uv)
-    print(f"{output}: {_rate(count, seconds)}, {np.count_nonzero(prim >= 0):,} hits, {scene.backend}")
+    print(f"{output}: {_rate(count, seconds)}, {np.count_nonzero(prim >= 0):,} hits, {_tracer(scene)}")
 
 
 def describe_mesh(options: Namespace) -> None:
@@ -79,7 +79,7 @@ def describe_mesh(options: Namespace) -> None:
         ("triangles", f"{len(scene):,}"),
         ("vertices", f"{len(scene.vertices):,}"),
         ("bounds", f"{low} to {high}"),
-        ("backend", scene.backend),
+        ("backend", _tracer(scene)),
         ("accuracy", scene.accuracy),
         ("nodes", f"{len(tree.nodes):,}"),
         ("depth", f"{tree.depth}"),
@@ -94,13 +94,23 @@ def describe_mesh(options: Namespace) -> None:
 
 
 def list_backends(options: Namespace) -> None:
-    """`wive backends`: what this machine can run."""
+    """`wive backends`: what this machine can run, and on which devices."""
     for name, backend in backends().items():
-        print(f"{name:<7} {'usable' if backend.usable else f'not usable: {backend.reason}'}")
+        print(f"{name:<7} {_usable(backend)}")
+        for device, found in backend.devices.items():
+            print(f"  {device:<7} {_usable(found)}")
 
 
 def _scene(options: Namespace, vertices: NDArray[Any], faces: NDArray[Any]) -> Scene:
     return Scene(vertices, faces, backend=options.backend, device=options.device, accuracy=options.accuracy)
+
+
+def _usable(backend: Backend) -> str:
+    return "usable" if backend.usable else f"not usable: {backend.reason}"
+
+
+def _tracer(scene: Scene) -> str:
+    return scene.backend if scene.device is None else f"{scene.backend} on {scene.device}"
 
 
 def _camera(options: Namespace, scene: Scene) -> Camera:

@@ -1,7 +1,8 @@
 """What queries return: hits, and counters of the work behind them."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,9 @@ class Stats(NamedTuple):
 @dataclass(frozen=True, eq=False, repr=False)
 class Hits:
     """The closest hit of each of n rays.
+
+    Arrays are NumPy's where the rays were, else of the library and on the device that the rays came in;
+    `vertices` and `faces` are always NumPy's.
 
     Attributes:
         t: (n,) float32, distance in multiples of the direction's length; inf on a miss.
@@ -74,3 +78,37 @@ class Hits:
     def _corners(self, hit: NDArray[np.bool_]) -> NDArray[np.float64]:
         """(3,h,3) corners of the triangles hit."""
         return self.vertices[self.faces[self.prim[hit]]].astype(np.float64).swapaxes(0, 1)
+
+
+class WrappedHits(Hits):
+    """Hits in the arrays of another library: what `wrap` makes of those that they were computed in."""
+
+    _home: Any
+    _wrap: Callable[[Any], Any]
+
+    def __init__(self, home: Any, wrap: Callable[[Any], Any]) -> None:
+        """Wrap t, prim and uv of `home`, a `Hits` or a `wive.warp_hits.WarpHits`; the rest when asked for."""
+        super().__init__(wrap(home.t), wrap(home.prim), wrap(home.uv), home.vertices, home.faces)
+        object.__setattr__(self, "_home", home)
+        object.__setattr__(self, "_wrap", wrap)
+
+    @property
+    def mask(self) -> Any:
+        """(n,) bool, true where the ray hit something."""
+        return self._wrap(self._home.mask)
+
+    def points(self) -> Any:
+        """(n,3) float64 hit points, as `Hits.points`."""
+        return self._wrap(self._home.points())
+
+    def normals(self) -> Any:
+        """(n,3) float64 unit normals, as `Hits.normals`."""
+        return self._wrap(self._home.normals())
+
+    def __len__(self) -> int:
+        """Number of rays."""
+        return int(self._home.t.shape[0])
+
+    def __repr__(self) -> str:
+        """Number of rays and where their hits are."""
+        return f"Hits({len(self)} rays, in arrays of {type(self.t).__module__.partition('.')[0]})"

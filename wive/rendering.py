@@ -1,6 +1,6 @@
 """Pictures: path tracing in bands of rows, and PNG files of them."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Literal
 
@@ -19,6 +19,7 @@ Image = NDArray[np.float32]
 ALBEDOS = ("gray", "normals")
 # Paths per band: some tenths of a second, so that the bar moves and Ctrl-C is heard between bands.
 BAND_PATHS = 300_000
+CUDA_BAND_PATHS = 1 << 20
 LARGEST_SIDE = 65_536
 
 
@@ -87,25 +88,25 @@ def render_counted(
     if camera is None:
         camera = Camera.framing(scene.bounds, aspect=width / height)
     frame = camera.frame(width, height)
-    threads = arguments.threads(settings.threads, available_threads())
     image = np.zeros((height, width, 3), np.float32)
+    render_rows = _rows_renderer(scene, frame, image, settings)
     rays = 0
     with progress_bar(height, "row", "rendering", show=progress) as advance:
-        for begin, end in _bands(width, height, settings.spp):
-            rays += scene._bvh.render_rows(
-                scene.backend,
-                frame,
-                image,
-                begin,
-                end,
-                settings.spp,
-                settings.bounces,
-                settings.albedo,
-                settings.seed,
-                threads,
-            )
+        for begin, end in _bands(height, width * settings.spp, scene.device):
+            rays += render_rows(begin, end)
             advance(end - begin)
     return image, rays
+
+
+def _rows_renderer(scene: Scene, frame: Image, image: Image, settings: Settings) -> Callable[[int, int], int]:
+    """A function that renders rows [begin, end) into `image` and returns how many rays it traced."""
+    what = (settings.spp, settings.bounces, settings.albedo, settings.seed)
+    if scene._warp is not None:
+        from wive.warp_render import PictureRenderer
+
+        return PictureRenderer(scene._warp, frame, image, *what).render_rows
+    threads = arguments.threads(settings.threads, available_threads())
+    return lambda begin, end: scene._bvh.render_rows(scene.backend, frame, image, begin, end, *what, threads)
 
 
 def check_png_output(path: PathLike) -> str:
@@ -129,7 +130,8 @@ def write_png(path: PathLike, image: Image) -> None:
         pillow.fromarray((encoded * 255 + 0.5).astype(np.uint8)).save(file, format="PNG", optimize=True)
 
 
-def _bands(width: int, height: int, spp: int) -> Iterator[tuple[int, int]]:
-    rows = max(1, BAND_PATHS // (width * spp))
+def _bands(height: int, row_paths: int, device: str | None) -> Iterator[tuple[int, int]]:
+    paths = BAND_PATHS if device in (None, "cpu") else CUDA_BAND_PATHS
+    rows = max(1, paths // row_paths)
     for begin in range(0, height, rows):
         yield begin, min(begin + rows, height)

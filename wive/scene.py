@@ -1,17 +1,25 @@
 """The scene: a mesh, the tree over it, and the queries users make."""
 
 from collections.abc import Callable
-from typing import Any, Literal, overload
+from typing import TYPE_CHECKING, Any, Literal, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from wive import _cpu, arguments
+from wive.arrays import NUMPY, host_array
 from wive.backend import available_threads, resolve_backend
 from wive.files import PathLike
-from wive.hits import Hits, Stats
+from wive.hits import Hits, Stats, WrappedHits
 from wive.meshfile import load_mesh
+from wive.rays import Rays, check_rays
 from wive.storage import Options, read_scene, write_scene
+
+if TYPE_CHECKING:
+    from wive.warp_kernels import Tree
+    from wive.warp_tracer import WarpTracer
+
+LanesOption = Literal["auto", 8, 1]
 
 
 class Scene:
@@ -21,6 +29,7 @@ class Scene:
     """
 
     _bvh: _cpu.Bvh
+    _warp: "WarpTracer | None" = None
 
     def __init__(
         self,
@@ -38,8 +47,9 @@ class Scene:
             vertices: (v,3) real numbers, used as float32.
             faces: (f,3) integers, three vertices a triangle, counter-clockwise as seen from the side that its
                 normal points to. Zero-area triangles keep their number and are never hit.
-            backend: "auto" (the fastest this machine has) or a name in `wive.backends()`.
-            device: must be None: CPU backends have no devices.
+            backend: "auto" (the fastest CPU backend this machine has) or a name in `wive.backends()`.
+            device: where backend "warp" traces, by Warp's names: "cpu", "cuda:0", ...; None is the first CUDA
+                device, else "cpu". A device alone implies backend "warp"; CPU backends take none.
             accuracy: "watertight" (rays never slip between triangles that share an edge or vertex) or "fast".
             nodes: "float32".
 
@@ -50,14 +60,15 @@ class Scene:
         """
         arguments.choice("accuracy", accuracy, ("fast", "watertight"))
         arguments.choice("nodes", nodes, ("float32",))
-        if device is not None:
-            raise ValueError(
-                f"device must be None in this version of wive: CPU backends have none, got {device!r}"
-            )
-        self._options = Options(backend=backend, accuracy=accuracy, nodes=nodes)
-        self._backend = resolve_backend(backend)
-        self._vertices, self._faces = map(_read_only, arguments.mesh(vertices, faces))
+        self._options = Options(backend=backend, device=device, accuracy=accuracy, nodes=nodes)
+        self._backend, self._device = resolve_backend(backend, device)
+        mesh = arguments.mesh(host_array("vertices", vertices), host_array("faces", faces))
+        self._vertices, self._faces = map(_read_only, mesh)
         self._bvh = _cpu.Bvh(self._vertices, self._faces, accuracy, threads=available_threads())
+        if self._device is not None:
+            from wive.warp_tracer import WarpTracer
+
+            self._warp = WarpTracer(self._bvh, self._vertices, self._faces, self._device)
 
     @classmethod
     def from_file(cls, path: PathLike, **kwargs: Any) -> "Scene":
@@ -74,6 +85,7 @@ class Scene:
         *,
         threads: int | None = None,
         in_flight: int | None = None,
+        lanes: LanesOption = "auto",
         stats: Literal[False] = False,
     ) -> Hits: ...
     @overload
@@ -86,6 +98,7 @@ class Scene:
         *,
         threads: int | None = None,
         in_flight: int | None = None,
+        lanes: LanesOption = "auto",
         stats: Literal[True],
     ) -> tuple[Hits, Stats]: ...
     def intersect(
@@ -97,6 +110,7 @@ class Scene:
         *,
         threads: int | None = None,
         in_flight: int | None = None,
+        lanes: LanesOption = "auto",
         stats: bool = False,
     ) -> Hits | tuple[Hits, Stats]:
         """The closest hit of each ray with tmin <= t <= tmax.
@@ -104,19 +118,35 @@ class Scene:
         Arguments:
             origins, directions: (n,3) real numbers; one of shape (3,) is shared by all rays. C-contiguous
                 float32 arrays are not copied, others are converted once. Directions may have any length.
+                Warp, torch and DLPack arrays give hits in arrays of their library, on their device, without
+                passing through the host; for a Warp scene they must lie on its device and be float32. No call
+                waits for the GPU then: with Warp's memory pools on, CUDA graphs can capture it.
             tmin, tmax: a number, or (n,) one a ray, in multiples of the direction's length.
-            threads: how many to use; None is every core.
+            threads: how many to use; None is every core. For CPU backends.
             in_flight: rays interleaved per thread; None leaves it to wive, 1 is plain single-ray traversal.
+                For CPU backends.
+            lanes: for backend "warp": 8, a thread owns a ray (throughput), 1, eight threads do (latency), or
+                "auto", chosen by device and number of rays.
             stats: return `(hits, stats)`, with what each ray visited.
 
-        Results depend on neither `threads` nor `in_flight` nor on how rays are split into batches. A ray with
-        a NaN or infinite origin, with a NaN, infinite or zero direction, or with tmin > tmax misses.
+        Results depend on none of `threads`, `in_flight` and `lanes`, nor on how rays are split into batches.
+        A ray misses whose origin is NaN or infinite, whose direction is NaN, infinite or zero, or whose tmin
+        is above its tmax.
+
+        Raises ValueError or TypeError, in one line naming the argument.
         """
-        t, prim, uv, counts = self._query(
-            self._bvh.intersect, origins, directions, tmin, tmax, threads, in_flight, stats
-        )
-        hits = Hits(t, prim, uv, self._vertices, self._faces)
-        return hits if counts is None else (hits, Stats(*counts.T))
+        rays = check_rays(origins, directions, tmin, tmax, self._backend, self._device)
+        chosen = arguments.lanes(lanes, self._warp is not None)
+        work = arguments.work(threads, available_threads(), in_flight, stats)
+        counts: Stats | None
+        if self._warp is not None:
+            hits, counts = self._warp.intersect(rays, chosen, bool(stats))
+        else:
+            t, prim, uv, table = self._bvh.intersect(self._backend, *rays.numpy(), *work)
+            hits, counts = Hits(t, prim, uv, self._vertices, self._faces), _columns(table, rays)
+            if rays.library is not NUMPY:
+                hits = WrappedHits(hits, rays.library.from_numpy)
+        return hits if counts is None else (hits, counts)
 
     @overload
     def occluded(
@@ -128,6 +158,7 @@ class Scene:
         *,
         threads: int | None = None,
         in_flight: int | None = None,
+        lanes: LanesOption = "auto",
         stats: Literal[False] = False,
     ) -> NDArray[np.bool_]: ...
     @overload
@@ -140,6 +171,7 @@ class Scene:
         *,
         threads: int | None = None,
         in_flight: int | None = None,
+        lanes: LanesOption = "auto",
         stats: Literal[True],
     ) -> tuple[NDArray[np.bool_], Stats]: ...
     def occluded(
@@ -151,13 +183,20 @@ class Scene:
         *,
         threads: int | None = None,
         in_flight: int | None = None,
+        lanes: LanesOption = "auto",
         stats: bool = False,
     ) -> NDArray[np.bool_] | tuple[NDArray[np.bool_], Stats]:
         """(n,) bool: whether each ray hits anything with tmin <= t <= tmax; arguments as for `intersect`."""
-        mask, counts = self._query(
-            self._bvh.occluded, origins, directions, tmin, tmax, threads, in_flight, stats
-        )
-        return mask if counts is None else (mask, Stats(*counts.T))
+        rays = check_rays(origins, directions, tmin, tmax, self._backend, self._device)
+        chosen = arguments.lanes(lanes, self._warp is not None)
+        work = arguments.work(threads, available_threads(), in_flight, stats)
+        counts: Stats | None
+        if self._warp is not None:
+            mask, counts = self._warp.occluded(rays, chosen, bool(stats))
+        else:
+            found, table = self._bvh.occluded(self._backend, *rays.numpy(), *work)
+            mask, counts = rays.library.from_numpy(found), _columns(table, rays)
+        return mask if counts is None else (mask, counts)
 
     def save(self, path: PathLike) -> None:
         """Write the scene to a file that `wive.load` reads; the file is whole or absent."""
@@ -189,6 +228,21 @@ class Scene:
         return self._backend
 
     @property
+    def device(self) -> str | None:
+        """The Warp device that traces, such as "cuda:0"; None for CPU backends."""
+        return self._device
+
+    @property
+    def tree(self) -> "Tree":
+        """The tree on the scene's Warp device, for `wive.warp_kernels`; ValueError for CPU backends."""
+        if self._warp is None:
+            raise ValueError(
+                f"tree is for scenes with backend 'warp', this one has {self._backend!r}: "
+                "make it with device='cpu' or device='cuda:0'"
+            )
+        return self._warp.tree
+
+    @property
     def accuracy(self) -> str:
         """ "watertight" or "fast"."""
         return self._bvh.accuracy
@@ -205,37 +259,19 @@ class Scene:
         """Pickle the mesh and the options; the tree is rebuilt where they are loaded."""
         return _rebuild, (self._vertices, self._faces, self._options)
 
-    def _query(
-        self,
-        query: Callable[..., tuple[Any, ...]],
-        origins: ArrayLike,
-        directions: ArrayLike,
-        tmin: ArrayLike,
-        tmax: ArrayLike,
-        threads: int | None,
-        in_flight: int | None,
-        stats: bool,
-    ) -> tuple[Any, ...]:
-        return query(
-            self._backend,
-            *arguments.rays(origins, directions, tmin, tmax),
-            threads=arguments.threads(threads, available_threads()),
-            in_flight=arguments.in_flight(in_flight),
-            stats=bool(stats),
-        )
 
-
-def load(path: PathLike, *, backend: str | None = None) -> Scene:
+def load(path: PathLike, *, backend: str | None = None, device: str | None = None) -> Scene:
     """The scene in a file that `Scene.save` wrote, with the options it was made with.
 
-    `backend` replaces the saved one: one saved with "avx512" opens with "auto" where that is missing.
+    `backend` or `device`, where given, replace both saved ones: a scene saved with "avx512" or on "cuda:0"
+    opens with backend "auto" where these are missing.
 
-    Raises OSError where the file can't be read, ValueError where it is not a saved scene or its backend can't
-    run here.
+    Raises OSError where the file can't be read, ValueError where it is not a saved scene or its backend or
+    device can't be used here.
     """
     vertices, faces, options = read_scene(path)
-    if backend is not None:
-        options["backend"] = backend
+    if backend is not None or device is not None:
+        options["backend"], options["device"] = backend or "auto", device
     try:
         return _rebuild(vertices, faces, options)
     except (TypeError, ValueError) as error:
@@ -244,6 +280,12 @@ def load(path: PathLike, *, backend: str | None = None) -> Scene:
 
 def _rebuild(vertices: NDArray[np.float32], faces: NDArray[np.int32], options: Options) -> Scene:
     return Scene(vertices, faces, **options)
+
+
+def _columns(table: NDArray[np.int32] | None, rays: Rays) -> Stats | None:
+    if table is None:
+        return None
+    return Stats(*(rays.library.from_numpy(np.ascontiguousarray(column)) for column in table.T))
 
 
 def _read_only(array: NDArray[Any]) -> NDArray[Any]:

@@ -17,6 +17,7 @@ class Options(TypedDict):
     """The options of `wive.Scene` as the user gave them."""
 
     backend: str
+    device: str | None
     accuracy: Literal["fast", "watertight"]
     nodes: Literal["float32"]
 
@@ -42,8 +43,13 @@ def read_scene(path: PathLike) -> tuple[NDArray[np.float32], NDArray[np.int32], 
         header = json.loads(str(arrays["header"]))
         is_scene, version = header["format"] == FORMAT, header["version"]
         given = header["options"]
-        options = Options(backend=given["backend"], accuracy=given["accuracy"], nodes=given["nodes"])
-    except (ValueError, TypeError, KeyError):
+        options = Options(
+            backend=given["backend"],
+            device=given.get("device"),
+            accuracy=given["accuracy"],
+            nodes=given["nodes"],
+        )
+    except (ValueError, TypeError, KeyError, AttributeError):
         is_scene = False
     if not is_scene:
         raise ValueError(f"{path}: not a scene saved by wive")

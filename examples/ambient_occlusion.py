@@ -1,0 +1,75 @@
+"""Ambient occlusion in a kernel of your own: how open to the sky is the ground round a tower?
+
+    python examples/ambient_occlusion.py --device cpu
+
+Prints a map of the ground from above: the darker the letter, the less sky it sees. The tower is left blank.
+"""
+
+import argparse
+
+import numpy as np
+import warp as wp
+
+from wive import _cpu
+from wive.warp_kernels import Bvh, any_hit, check, closest_hit, upload
+
+SAMPLES = 256
+SIDE = 24
+SHADES = "@#*+=-. "
+
+
+@wp.kernel
+def sky_seen(
+    bvh: Bvh, origins: wp.array(dtype=wp.vec3), height: wp.array(dtype=float), sky: wp.array(dtype=float)
+):
+    """From each origin straight down, then from the place hit up into the hemisphere, by cosine."""
+    i = wp.tid()
+    up = wp.vec3(0.0, 0.0, 1.0)
+    hit = closest_hit(bvh, origins[i], -up, 0.0, wp.inf)
+    point = origins[i] - (hit.t - 1.0e-4) * up
+    height[i] = point[2]
+    state = wp.rand_init(1, i)
+    free = int(0)  # noqa: RUF046, UP018
+    for _ in range(SAMPLES):
+        direction = wp.sample_unit_sphere_surface(state) + up
+        if not any_hit(bvh, point, direction, 0.0, wp.inf):
+            free += 1
+    sky[i] = float(free) / float(SAMPLES)
+
+
+def tower() -> tuple[np.ndarray, np.ndarray]:
+    """A tower of 2 x 2 x 6 on a ground of 12 x 12."""
+    corners = [(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (0, 6)] + [
+        (-6, -6, 0),
+        (6, -6, 0),
+        (6, 6, 0),
+        (-6, 6, 0),
+    ]
+    sides = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (1, 5, 7, 3), (8, 9, 10, 11)]
+    faces = [f for a, b, c, d in sides for f in ((a, b, c), (a, c, d))]
+    return np.array(corners, np.float32), np.array(faces, np.int32)
+
+
+def main() -> None:
+    """Trace the map and print it."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--device", default="cpu", help="a Warp device: cpu, cuda:0, ...")
+    device = parser.parse_args().device
+
+    tree = upload(_cpu.Bvh(*tower()), device)
+    steps = np.linspace(-5.75, 5.75, SIDE)
+    places = np.stack([*np.meshgrid(steps, steps), np.full((SIDE, SIDE), 10.0)], axis=-1).reshape(-1, 3)
+    origins = wp.array(places, dtype=wp.vec3, device=device)
+    height, sky = (wp.zeros(len(places), dtype=float, device=device) for _ in range(2))
+    wp.launch(sky_seen, len(places), inputs=[tree.handle, origins, height, sky], device=device)
+    check(tree)
+    shade = np.interp(sky.numpy(), (0.5, 1), (0, len(SHADES) - 1)).astype(int).reshape(SIDE, SIDE)
+    on_ground = height.numpy().reshape(SIDE, SIDE) < 1
+    for row, ground in zip(shade, on_ground, strict=True):
+        print("".join(SHADES[s] * 2 if g else "  " for s, g in zip(row, ground, strict=True)))
+
+
+if __name__ == "__main__":
+    main()

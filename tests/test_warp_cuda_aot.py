@@ -1,0 +1,165 @@
+"""The CUDA side without a GPU: every kernel is built ahead of time, and held to what the assembler says.
+
+Warp brings NVRTC, which compiles to PTX. Registers, stack and spills come from ptxas, which has to be as new
+as that NVRTC: `pip install nvidia-cuda-nvcc`, a CUDA toolkit, or WIVE_PTXAS=/path/to/ptxas.
+"""
+
+import importlib.util
+import os
+import re
+import shutil
+import subprocess
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+wp = pytest.importorskip("warp")
+
+from wive.warp_kernels import kernels  # noqa: E402
+from wive.warp_kernels.launch import default_block_dim  # noqa: E402
+
+ARCHITECTURES = (80, 90, 100)
+STACK = 96
+KERNELS = {"closest": kernels.closest_kernel, "any": kernels.any_kernel}
+
+# Registers, measured with NVRTC and ptxas 13.5 and rounded up to a multiple of eight.
+REGISTERS = {
+    ("fast", 8): 96,
+    ("watertight", 8): 112,
+    ("fast", 1): 72,
+    ("watertight", 1): 96,
+}
+# Bytes: a thread that owns its stack holds a child and, for the closest hit, a distance an entry, and up to
+# eleven words of the ray behind them. A group's stack is in shared memory.
+STACK_BYTES = {("closest", 8): STACK * 8 + 48, ("any", 8): STACK * 4 + 48, ("closest", 1): 0, ("any", 1): 0}
+
+
+@dataclass(frozen=True)
+class Usage:
+    """What a kernel's threads take."""
+
+    registers: int
+    stack: int
+    spills: int
+
+
+def compiled_ptx(module: wp.Module, architecture: int, folder: Path) -> str:
+    """The PTX of a module, as NVRTC wrote it. Raises where CUDA code does not compile."""
+    wp.compile_aot_module(module, arch=architecture, module_dir=str(folder), use_ptx=True)
+    (path,) = folder.glob(f"*.sm{architecture}.ptx")
+    return path.read_text().rstrip("\0")
+
+
+def find_ptxas() -> Iterator[Path]:
+    """Every ptxas there is to try, in the order of preference."""
+    if asked := os.environ.get("WIVE_PTXAS"):
+        yield Path(asked)
+    spec = importlib.util.find_spec("nvidia")
+    for folder in (spec.submodule_search_locations if spec is not None else None) or []:
+        yield from sorted(Path(folder).glob("*/bin/ptxas"), reverse=True)
+    if on_path := shutil.which("ptxas"):
+        yield Path(on_path)
+    yield from sorted(Path("/usr/local").glob("cuda*/bin/ptxas"), reverse=True)
+
+
+def assemble(ptx: str, architecture: int, folder: Path) -> Usage:
+    """Assemble PTX and read what ptxas says of its kernel; skip where no ptxas here knows its version."""
+    source = folder / "kernel.ptx"
+    source.write_text(ptx)
+    tried = []
+    for ptxas in find_ptxas():
+        command = [
+            str(ptxas),
+            "-v",
+            f"--gpu-name=sm_{architecture}",
+            str(source),
+            "-o",
+            str(folder / "kernel.cubin"),
+        ]
+        run = subprocess.run(command, capture_output=True, text=True, timeout=120)
+        if "Unsupported .version" in run.stderr:
+            tried.append(str(ptxas))
+            continue
+        assert run.returncode == 0, run.stderr
+        frames = re.findall(
+            r"(\d+) bytes stack frame, (\d+) bytes spill stores, (\d+) bytes spill loads", run.stderr
+        )
+        registers = re.findall(r"Used (\d+) registers", run.stderr)
+        assert frames and registers, run.stderr
+        return Usage(
+            registers=max(map(int, registers)),
+            stack=max(int(frame[0]) for frame in frames),
+            spills=sum(int(frame[1]) + int(frame[2]) for frame in frames),
+        )
+    pytest.skip(
+        f"no ptxas reads this PTX (tried: {', '.join(tried) or 'none found'}): pip install nvidia-cuda-nvcc"
+    )
+
+
+@pytest.mark.timeout(120)
+@pytest.mark.parametrize("architecture", ARCHITECTURES)
+@pytest.mark.parametrize("lanes", [8, 1])
+@pytest.mark.parametrize("accuracy", ["fast", "watertight"])
+@pytest.mark.parametrize("query", KERNELS)
+def test_kernel_compiles_for_cuda_within_its_limits(
+    query: str, accuracy: str, lanes: int, architecture: int, tmp_path: Path
+) -> None:
+    kernel = KERNELS[query](accuracy, lanes, STACK, False)
+    kernel.module.options["block_dim"] = default_block_dim(lanes)
+    ptx = compiled_ptx(kernel.module, architecture, tmp_path)
+    # The CUDA branches are what was compiled: the collectives of a group, wide loads of a thread.
+    assert ("redux.sync" in ptx) == (lanes == 1)
+    assert ("ld.global.nc.v4" in ptx) == (lanes == 8)
+    usage = assemble(ptx, architecture, tmp_path)
+    assert usage.spills == 0
+    assert usage.stack <= STACK_BYTES[query, lanes]
+    assert usage.registers <= REGISTERS[accuracy, lanes]
+
+
+@pytest.mark.timeout(120)
+@pytest.mark.parametrize("lanes", [8, 1])
+def test_kernel_with_counters_compiles_for_cuda(lanes: int, tmp_path: Path) -> None:
+    for query, make in KERNELS.items():
+        folder = tmp_path / query
+        folder.mkdir()
+        compiled_ptx(make("watertight", lanes, STACK, True).module, 90, folder)
+
+
+@wp.func_native("""
+#if defined(__CUDA_ARCH__)
+    return __reduce_or_sink(0xffu, x);
+#else
+    return x;
+#endif
+""")
+def broken_on_cuda(x: wp.uint32) -> wp.uint32: ...
+
+
+@wp.kernel(module="unique", enable_backward=False)
+def planted_fault(x: wp.array(dtype=wp.uint32)):
+    x[0] = broken_on_cuda(x[0])
+
+
+@wp.kernel(module="unique", enable_backward=False)
+def planted_spill(x: wp.array(dtype=wp.float32)):
+    kept = wp.vector(dtype=wp.float32, length=96)
+    for i in range(96):
+        kept[i] = x[i]
+    at = int(x[0])
+    x[0] = kept[at]
+
+
+@pytest.mark.timeout(60)
+def test_guard_fails_on_a_broken_cuda_branch(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    array = wp.ones(1, dtype=wp.uint32, device="cpu")
+    wp.launch(planted_fault, 1, inputs=[array], device="cpu")  # the CPU branch has nothing wrong with it
+    with pytest.raises(Exception, match=r"CUDA|NVRTC|build"):
+        compiled_ptx(planted_fault.module, 90, tmp_path)
+
+
+@pytest.mark.timeout(60)
+def test_guard_sees_memory_that_a_kernel_falls_back_to(tmp_path: Path) -> None:
+    usage = assemble(compiled_ptx(planted_spill.module, 90, tmp_path), 90, tmp_path)
+    assert usage.stack >= 96 * 4

@@ -1,0 +1,162 @@
+"""Every query, accuracy and backend on the same rays: the Warp forms answer bit for bit as the C++ core."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+pytest.importorskip("warp")
+
+from meshes import random_rays, soup, sphere
+from warp_launches import assert_bit_identical, cpu_answers, warp_answers
+
+from wive import _cpu
+
+pytestmark = pytest.mark.timeout(120)
+
+HITS = ("t", "prim", "uv", "occluded")
+CPU_KERNELS = [name for name, reason in _cpu.kernels().items() if not reason and "." not in name]
+ACCURACIES = ("fast", "watertight")
+Mesh = tuple[np.ndarray, np.ndarray]
+
+
+def inside(vertices: np.ndarray, count: int, seed: int) -> Mesh:
+    """Rays from random points of a mesh's box, in random directions."""
+    origins, directions = random_rays(count, seed, 0.0, 1.0)
+    low, high = vertices.min(axis=0), vertices.max(axis=0)
+    return (low + (high - low) * origins).astype(np.float32), directions
+
+
+@pytest.mark.parametrize("accuracy", ACCURACIES)
+@pytest.mark.parametrize("scene", ["staircase", "living_room"])
+def test_every_backend_gives_the_same_bits_on_real_scenes(
+    scene: str, accuracy: str, scenes: Callable[[str], Mesh]
+) -> None:
+    vertices, faces = scenes(scene)
+    bvh = _cpu.Bvh(
+        np.ascontiguousarray(vertices, np.float32), np.ascontiguousarray(faces, np.int32), accuracy
+    )
+    origins, directions = inside(vertices, 20_000, 1)
+    reference = cpu_answers(bvh, "scalar", origins, directions)
+    assert (reference.prim >= 0).mean() > 0.5
+    for kernel in CPU_KERNELS:
+        assert_bit_identical(cpu_answers(bvh, kernel, origins, directions), reference, HITS)
+    assert_bit_identical(warp_answers(bvh, 8, origins, directions), reference)
+    few = slice(0, 1500)  # fibers are slow
+    one_lane = warp_answers(bvh, 1, origins[few], directions[few])
+    assert_bit_identical(one_lane, cpu_answers(bvh, "scalar", origins[few], directions[few]))
+
+
+@pytest.mark.parametrize("accuracy", ACCURACIES)
+@pytest.mark.parametrize("count", [1, 3, 13, 101])
+def test_partial_blocks_answer_as_full_ones(count: int, accuracy: str) -> None:
+    bvh = _cpu.Bvh(*soup(3000, 2), accuracy)
+    origins, directions = random_rays(count, 3)
+    reference = cpu_answers(bvh, "scalar", origins, directions)
+    for lanes in (8, 1):
+        assert_bit_identical(warp_answers(bvh, lanes, origins, directions), reference)
+
+
+@pytest.mark.parametrize("block_dim", [8, 24, 128])
+def test_block_size_does_not_change_the_answer(block_dim: int) -> None:
+    bvh = _cpu.Bvh(*soup(3000, 2))
+    origins, directions = random_rays(101, 4)
+    reference = cpu_answers(bvh, "scalar", origins, directions)
+    assert_bit_identical(warp_answers(bvh, 1, origins, directions, block_dim=block_dim), reference)
+
+
+@pytest.mark.parametrize("lanes", [8, 1])
+def test_groups_of_a_block_go_their_own_ways(lanes: int) -> None:
+    """In one block: rays that miss at once, refused rays, short intervals and rays through everything."""
+    bvh = _cpu.Bvh(*soup(6000, 5))
+    origins, directions = random_rays(160, 6, 0.0, 1.0)
+    origins[::5] = 1e6
+    directions[1::5] = np.nan
+    tmax = np.where(np.arange(160) % 5 == 2, 1e-3, np.inf).astype(np.float32)
+    tmin = np.where(np.arange(160) % 5 == 3, 0.5, -np.inf).astype(np.float32)
+    reference = cpu_answers(bvh, "scalar", origins, directions, tmin, tmax)
+    assert len(np.unique(reference.steps[:, 0])) > 10
+    assert_bit_identical(warp_answers(bvh, lanes, origins, directions, tmin, tmax), reference)
+
+
+def hard_rays(vertices: np.ndarray, faces: np.ndarray) -> Mesh:
+    """Rays at vertices, edges and face centres from inside and outside, axis rays, rays that are none."""
+    center = (vertices.min(axis=0).astype(np.float64) + vertices.max(axis=0)) / 2
+    corners = vertices[faces].astype(np.float64)
+    aims = np.concatenate([vertices, corners[:, :2].mean(axis=1), corners.mean(axis=1)])
+    random = np.random.default_rng(7)
+    aims = aims[random.permutation(len(aims))[:400]]
+    size = np.ptp(vertices, axis=0).max()
+    starts = center + np.where(np.arange(len(aims)) % 2, 0.0, 1.7)[:, None] * size * random.standard_normal(3)
+    axis_directions = np.stack(np.meshgrid(*[[-1.0, -0.0, 0.0, 1.0]] * 3), axis=-1).reshape(-1, 3)
+    axis_starts = np.concatenate([np.repeat(center[None], 64, axis=0), np.resize(vertices, (64, 3))])
+    odd_origins = np.array([[np.nan, 0, 0], [0, np.inf, 0], [0, 0, 0], [0, 0, 0], [0, 0, 0], [0, 0, 2e18]])
+    odd_directions = np.array([[1, 0, 0], [1, 0, 0], [np.nan, 1, 0], [1, -np.inf, 0], [0, 0, 0], [0, 0, -1]])
+    tiny = np.array([[1e-42, 0, 0], [1e38, 1e-38, 0], [3e38, 3e38, 3e38], [1.0, 1e-30, -1e-40]])
+    origins = np.concatenate([starts, axis_starts, odd_origins, np.repeat(center[None], 4, axis=0)])
+    directions = np.concatenate([aims - starts, axis_directions, axis_directions, odd_directions, tiny])
+    with np.errstate(over="ignore"):
+        return origins.astype(np.float32), directions.astype(np.float32)
+
+
+HARD_MESHES = {
+    "sphere": lambda: sphere(3),
+    "sphere far away": lambda: (sphere(3)[0] + np.float32([148376, 1234, -223423]), sphere(3)[1]),
+    "tiny sphere": lambda: sphere(2, 1e-6),
+    "huge sphere": lambda: sphere(2, 1e6),
+    "integer grid": lambda: grid(8),
+    "one triangle": lambda: (np.float32([[0, 0, 1], [1, 0, 1], [0, 1, 1]]), np.int32([[0, 1, 2]])),
+    "coincident": lambda: (sphere(1)[0], np.repeat(sphere(1)[1], 5, axis=0)),
+    "degenerate": lambda: (sphere(1)[0], np.ascontiguousarray(sphere(1)[1][:, [0, 1, 1]])),
+    "empty": lambda: (np.zeros((3, 3), np.float32), np.zeros((0, 3), np.int32)),
+}
+
+
+def grid(side: int) -> Mesh:
+    """A flat square of unit cells with corners at integers."""
+    x, y = np.meshgrid(np.arange(side + 1), np.arange(side + 1), indexing="ij")
+    vertices = np.stack([x, y, 0 * x], axis=-1).reshape(-1, 3).astype(np.float32)
+    a = (np.arange(side)[:, None] * (side + 1) + np.arange(side)).reshape(-1)
+    faces = np.concatenate(
+        [np.stack([a, a + side + 1, a + 1], 1), np.stack([a + 1, a + side + 1, a + side + 2], 1)]
+    )
+    return vertices, faces.astype(np.int32)
+
+
+@pytest.mark.parametrize("accuracy", ACCURACIES)
+@pytest.mark.parametrize("mesh", HARD_MESHES)
+def test_hard_rays_give_the_same_bits_in_every_form(mesh: str, accuracy: str) -> None:
+    vertices, faces = HARD_MESHES[mesh]()
+    bvh = _cpu.Bvh(vertices, faces, accuracy)
+    origins, directions = hard_rays(vertices, faces) if len(faces) else random_rays(50, 8)
+    tmin = np.full(1, -np.inf, np.float32)  # behind the origin, too: t of either sign
+    reference = cpu_answers(bvh, "scalar", origins, directions, tmin)
+    for lanes in (8, 1):
+        assert_bit_identical(warp_answers(bvh, lanes, origins, directions, tmin), reference)
+
+
+def test_empty_and_exact_intervals_are_kept_to() -> None:
+    bvh = _cpu.Bvh(*HARD_MESHES["one triangle"]())
+    origins = np.tile(np.float32([0.25, 0.25, 0]), (6, 1))
+    directions = np.tile(np.float32([0, 0, 1]), (6, 1))
+    tmin = np.float32([0, 1, 2, 1, 0, np.nan])
+    tmax = np.float32([1, 1, 1, 0, 0.999, 5])
+    for lanes in (8, 1):
+        found = warp_answers(bvh, lanes, origins, directions, tmin, tmax)
+        np.testing.assert_array_equal(found.prim, [0, 0, -1, -1, -1, -1])
+        np.testing.assert_array_equal(found.occluded, [True, True, False, False, False, False])
+
+
+@pytest.mark.parametrize("lanes", [8, 1])
+def test_closed_sphere_never_leaks_at_vertices_and_edges(lanes: int) -> None:
+    vertices, faces = sphere(4)
+    shift = np.float32([148376, 1234, -223423])
+    middles = vertices[faces][:, :2].mean(axis=1)
+    for offset in (np.float32([0, 0, 0]), shift):
+        moved = vertices + offset
+        aims = np.concatenate([moved, (middles + offset).astype(np.float32)])
+        if lanes == 1:
+            aims = aims[::10]
+        origins = np.tile(offset, (len(aims), 1))
+        found = warp_answers(_cpu.Bvh(moved, faces), lanes, origins, aims - origins)
+        assert (found.prim >= 0).all() and found.occluded.all()

@@ -1,0 +1,83 @@
+"""Both queries over a batch of rays by a C++ kernel or a Warp lane form, and what it means to agree."""
+
+import dataclasses
+from collections.abc import Sequence
+
+import numpy as np
+import warp as wp
+
+from wive import _cpu, warp_kernels
+
+# One size for all trees here, so that a kernel is compiled once.
+STACK = 128
+
+INFINITE = np.full(1, np.inf, np.float32)
+ZERO = np.zeros(1, np.float32)
+
+
+@dataclasses.dataclass(frozen=True)
+class Answers:
+    """What both queries wrote, and how many steps each took."""
+
+    t: np.ndarray
+    prim: np.ndarray
+    uv: np.ndarray
+    occluded: np.ndarray
+    steps: np.ndarray  # (n, 3) of the closest hit
+    any_steps: np.ndarray
+
+
+def cpu_answers(
+    bvh: _cpu.Bvh,
+    kernel: str,
+    origins: np.ndarray,
+    directions: np.ndarray,
+    tmin: np.ndarray = ZERO,
+    tmax: np.ndarray = INFINITE,
+) -> Answers:
+    rays = origins, directions, tmin, tmax
+    t, prim, uv, steps = bvh.intersect(kernel, *rays, threads=1, in_flight=1, stats=True)
+    occluded, any_steps = bvh.occluded(kernel, *rays, threads=1, in_flight=1, stats=True)
+    assert steps is not None and any_steps is not None
+    return Answers(t, prim, uv, occluded, steps, any_steps)
+
+
+def warp_answers(
+    bvh: _cpu.Bvh,
+    lanes: warp_kernels.launch.Lanes,
+    origins: np.ndarray,
+    directions: np.ndarray,
+    tmin: np.ndarray = ZERO,
+    tmax: np.ndarray = INFINITE,
+    *,
+    device: str = "cpu",
+    block_dim: int | None = None,
+) -> Answers:
+    tree = dataclasses.replace(warp_kernels.upload(bvh, device), stack=STACK)
+    count = len(origins)
+    rays = [
+        wp.array(origins, dtype=wp.vec3, device=device),
+        wp.array(directions, dtype=wp.vec3, device=device),
+        wp.array(tmin, dtype=wp.float32, device=device),
+        wp.array(tmax, dtype=wp.float32, device=device),
+    ]
+    t, prim = wp.zeros(count, dtype=wp.float32, device=device), wp.zeros(count, dtype=wp.int32, device=device)
+    uv, occluded = (
+        wp.zeros(count, dtype=wp.vec2, device=device),
+        wp.zeros(count, dtype=wp.bool, device=device),
+    )
+    steps = [wp.zeros(count, dtype=wp.vec3i, device=device) for _ in range(2)]
+    warp_kernels.launch_closest(tree, *rays, t, prim, uv, stats=steps[0], lanes=lanes, block_dim=block_dim)
+    warp_kernels.launch_any(tree, *rays, occluded, stats=steps[1], lanes=lanes, block_dim=block_dim)
+    warp_kernels.check(tree)
+    return Answers(*(array.numpy() for array in (t, prim, uv, occluded, *steps)))
+
+
+def assert_bit_identical(one: Answers, other: Answers, fields: Sequence[str] | None = None) -> None:
+    """Every number of the same bits (the bits of a NaN aside: which NaN a miss holds means nothing)."""
+    for field in fields or [field.name for field in dataclasses.fields(Answers)]:
+        mine, theirs = getattr(one, field), getattr(other, field)
+        if mine.dtype == np.float32:
+            np.testing.assert_array_equal(np.isnan(mine), np.isnan(theirs), err_msg=field)
+            mine, theirs = (np.where(np.isnan(a), 0, a).view(np.uint32) for a in (mine, theirs))
+        np.testing.assert_array_equal(mine, theirs, err_msg=field)

@@ -1,0 +1,140 @@
+"""The native code of what lanes do: intrinsics on CUDA, plain C++ on Warp's CPU device."""
+
+# Eight threads are one group, aligned within their warp.
+_GROUP_MASK = "const unsigned group = 0xffu << (threadIdx.x & 24u);"
+
+# Every fiber of the group writes its value, waits, reads all eight, and waits before anyone writes again.
+_EXCHANGE = """
+    static unsigned values[WP_TILE_BLOCK_DIM];
+    const int thread = WP_TILE_THREAD_IDX;
+    values[thread] = x;
+    WP_TILE_SYNC();
+    unsigned all = values[thread & ~7];
+    for (int i = 1; i < 8; ++i) { const unsigned y = values[(thread & ~7) + i]; all = COMBINE; }
+    WP_TILE_SYNC();
+    return all;
+"""
+
+
+def _reduce(cuda: str, combine: str) -> str:
+    """Native code that reduces the unsigned x of a group; CUDA has it as one instruction since sm_80."""
+    return f"""
+#if defined(__CUDA_ARCH__)
+    {_GROUP_MASK}
+#if __CUDA_ARCH__ >= 800
+    return {cuda}(group, x);
+#else
+    unsigned all = x;
+    for (int step = 4; step; step >>= 1) {{
+        const unsigned y = __shfl_xor_sync(group, all, step, 8);
+        all = {combine};
+    }}
+    return all;
+#endif
+#else
+    {_EXCHANGE.replace("COMBINE", combine)}
+#endif
+"""
+
+
+OR_REDUCE = _reduce("__reduce_or_sync", "all | y")
+MIN_REDUCE = _reduce("__reduce_min_sync", "y < all ? y : all")
+
+SYNC = f"""
+#if defined(__CUDA_ARCH__)
+    {_GROUP_MASK}
+    __syncwarp(group);
+#else
+    WP_TILE_SYNC();
+#endif
+"""
+
+# A row of the node against the ray: plane * rdir + bias. CUDA fuses the two; a row is two loads of 16 bytes
+# there.
+DISTANCES_8 = """
+    const float* row = (const float*)units + at;
+    wp::vec_t<8, wp::float32> distances;
+#if defined(__CUDA_ARCH__)
+    const float4 a = __ldg((const float4*)row), b = __ldg((const float4*)row + 1);
+    distances[0] = __fmaf_rn(a.x, rdir, bias); distances[1] = __fmaf_rn(a.y, rdir, bias);
+    distances[2] = __fmaf_rn(a.z, rdir, bias); distances[3] = __fmaf_rn(a.w, rdir, bias);
+    distances[4] = __fmaf_rn(b.x, rdir, bias); distances[5] = __fmaf_rn(b.y, rdir, bias);
+    distances[6] = __fmaf_rn(b.z, rdir, bias); distances[7] = __fmaf_rn(b.w, rdir, bias);
+#else
+    for (int i = 0; i < 8; ++i) distances[i] = row[i] * rdir + bias;
+#endif
+    return distances;
+"""
+DISTANCES_1 = """
+    const float* row = (const float*)units + at + lane;
+#if defined(__CUDA_ARCH__)
+    return wp::vec_t<1, wp::float32>(__fmaf_rn(__ldg(row), rdir, bias));
+#else
+    return wp::vec_t<1, wp::float32>(*row * rdir + bias);
+#endif
+"""
+
+# The same row as it is, for children and ranks.
+ROW_8 = """
+    const float* row = (const float*)units + at;
+    wp::vec_t<8, wp::uint32> words;
+#if defined(__CUDA_ARCH__)
+    const uint4 a = __ldg((const uint4*)row), b = __ldg((const uint4*)row + 1);
+    words[0] = a.x; words[1] = a.y; words[2] = a.z; words[3] = a.w;
+    words[4] = b.x; words[5] = b.y; words[6] = b.z; words[7] = b.w;
+#else
+    for (int i = 0; i < 8; ++i) words[i] = ((const wp::uint32*)row)[i];
+#endif
+    return words;
+"""
+ROW_1 = """
+    const wp::uint32* row = (const wp::uint32*)units + at + lane;
+#if defined(__CUDA_ARCH__)
+    return wp::vec_t<1, wp::uint32>(__ldg(row));
+#else
+    return wp::vec_t<1, wp::uint32>(*row);
+#endif
+"""
+
+# Four triangles' worth of a row of a block, or the lane's own.
+TRIANGLES_4 = """
+    const float* row = (const float*)units + at;
+#if defined(__CUDA_ARCH__)
+    const float4 a = __ldg((const float4*)row);
+    return wp::vec_t<4, wp::float32>(a.x, a.y, a.z, a.w);
+#else
+    return wp::vec_t<4, wp::float32>(row[0], row[1], row[2], row[3]);
+#endif
+"""
+
+# Products that no compiler may fuse with an addition, whatever the options of the module they end up in:
+# fused, the two triangles at an edge would not compute the same numbers.
+PRODUCT = """
+#if defined(__CUDA_ARCH__)
+    return ROUNDED(a, b);
+#else
+    return a * b;
+#endif
+"""
+PRODUCTS = """
+    wp::vec_t<LENGTH, wp::float32> c;
+#if defined(__CUDA_ARCH__)
+    for (int i = 0; i < LENGTH; ++i) c[i] = __fmul_rn(a[i], b[i]);
+#else
+    for (int i = 0; i < LENGTH; ++i) c[i] = a[i] * b[i];
+#endif
+    return c;
+"""
+
+
+def shared_stack_code(words: int) -> str:
+    """Native code for a group's piece of the stack that the groups of a block share, `words` of 32 bits."""
+    return f"""
+#if defined(__CUDA_ARCH__)
+    __shared__ unsigned stack[(WP_TILE_BLOCK_DIM + 7) / 8][{words}];
+    return (wp::uint64)&stack[threadIdx.x >> 3][0];
+#else
+    static unsigned stack[(WP_TILE_BLOCK_DIM + 7) / 8][{words}];
+    return (wp::uint64)&stack[WP_TILE_THREAD_IDX >> 3][0];
+#endif
+"""

@@ -1,0 +1,59 @@
+"""What a query keeps of the hits it is offered, as cpu/query.h."""
+
+from types import SimpleNamespace
+
+# mypy: ignore-errors
+# Warp compiles these functions: to mypy they are no Python.
+import warp as wp
+
+from wive.warp_kernels.handle import NO_PRIM
+
+
+@wp.struct
+class Best:
+    """The best hit so far, in the frame's units: t falls with every hit found."""
+
+    t: wp.float32
+    u: wp.float32
+    v: wp.float32
+    prim: wp.int32
+
+
+@wp.func
+def offer_closest(best: Best, tmin: float, hit: wp.vec3, prim: int):
+    """The nearest hit in [tmin, t]; of hits at the same t, the lowest prim, in whatever order they come."""
+    t = hit[0]
+    if t >= tmin and (t < best.t or (t == best.t and wp.uint32(prim) < wp.uint32(best.prim))):
+        best.t = t
+        best.u = hit[1]
+        best.v = hit[2]
+        best.prim = prim
+    return best
+
+
+@wp.func
+def offer_any(best: Best, tmin: float, hit: wp.vec3, prim: int):
+    """Any hit in [tmin, t]."""
+    if hit[0] >= tmin and hit[0] <= best.t:
+        best.prim = prim
+    return best
+
+
+@wp.func
+def closest_done(best: Best):
+    """Whether one thread's hits end the query."""
+    return False
+
+
+@wp.func
+def any_done(best: Best):
+    """Whether one thread's hits end the query."""
+    return best.prim != wp.static(NO_PRIM)
+
+
+# in_order: children are met from front to back and kept with their distances, because tmax falls with every
+# hit.
+QUERIES = {
+    "closest": SimpleNamespace(in_order=True, offer=offer_closest, done=closest_done),
+    "any": SimpleNamespace(in_order=False, offer=offer_any, done=any_done),
+}

@@ -1,0 +1,203 @@
+"""WiVe: single-ray traversal of the 8-wide tree, as cpu/traversal.h.
+
+Fuetterling, Lojewski, Pfreundt, Hamann, Ebert: "Accelerated Single Ray Tracing for Wide Vector Units", HPG
+2017.
+"""
+
+# mypy: ignore-errors
+# Warp compiles these functions: to mypy they are no Python.
+
+import functools
+from types import SimpleNamespace
+
+import warp as wp
+
+from wive.warp_kernels import triangle_fast, triangle_watertight
+from wive.warp_kernels.frame import RayFrame, is_negative
+from wive.warp_kernels.handle import (
+    ALL_BITS,
+    BLOCK_WIDTH,
+    BLOCK_WORDS,
+    CORRUPT,
+    END_OF_STACK,
+    HANDLES,
+    NO_PRIM,
+    NODE_WIDTH,
+    PRIM_ROW,
+    SIGN_BIT,
+    WORD_MASK,
+)
+from wive.warp_kernels.lanes import address_of, lanes_of, load_float, lowest_lane, without_gradient
+from wive.warp_kernels.query import QUERIES, Best
+from wive.warp_kernels.slabs import make_visit
+
+TRIANGLES = {
+    "fast": (triangle_fast.fast_triangles, triangle_fast.KEPT_WORDS),
+    "watertight": (triangle_watertight.watertight_triangles, triangle_watertight.KEPT_WORDS),
+}
+
+
+@wp.struct
+class Traversal:
+    """What a thread knows at the end: its own best hit, how the group stands, and the steps taken."""
+
+    best: Best
+    tmax: wp.float32  # the group's
+    inner_nodes: wp.int32
+    leaves: wp.int32
+    triangles: wp.int32
+
+
+@wp.func
+def sortable(t: float):
+    """t as an integer that sorts as t does; -0 and 0 are one."""
+    bits = wp.cast(t + 0.0, wp.uint32)
+    return bits ^ wp.where(is_negative(t + 0.0), ALL_BITS, SIGN_BIT)
+
+
+@wp.func
+def unsortable(key: wp.uint32):
+    """The t whose `sortable` is key."""
+    positive = (key >> wp.uint32(31)) != wp.uint32(0)
+    return wp.cast(key ^ wp.where(positive, SIGN_BIT, ALL_BITS), wp.float32)
+
+
+@functools.cache
+def make_traversal(query: str, accuracy: str, length: int, entries: int, counters: bool) -> wp.Function:
+    """The traversal for one query, accuracy and lane form; that many stack entries must do for the tree."""
+    asked = QUERIES[query]
+    in_order: bool = asked.in_order
+    make_triangles, kept_words = TRIANGLES[accuracy]
+    lanes = lanes_of(length, entries, in_order, kept_words)
+    triangles = make_triangles(lanes, entries * (2 if in_order else 1))
+    visit = make_visit(lanes, entries, in_order)
+    test_leaf = make_leaf_test(asked, lanes, triangles)
+    tree_type = HANDLES[accuracy]
+    prepare = triangles.prepare
+    new_stack, sync = lanes.new_stack, lanes.sync
+    store_word, load_word = lanes.store_word, lanes.load_word
+    or_reduce, min_reduce = lanes.or_reduce, lanes.min_reduce
+
+    @without_gradient
+    @wp.func
+    def traverse(tree: tree_type, ray: RayFrame, lane: int) -> Traversal:
+        units = address_of(tree.units)
+        words = wp.uint32(tree.units.shape[0])
+        state = Traversal()
+        state.best.t = ray.tmax
+        state.best.prim = wp.static(NO_PRIM)
+        state.tmax = ray.tmax
+        stack = new_stack()
+        prepare(ray, stack)
+        # Below all others is an entry that is always near enough to be taken, and whose child ends the
+        # traversal.
+        store_word(stack, 0, ALL_BITS)
+        if wp.static(in_order):
+            store_word(stack, entries, wp.cast(-wp.inf, wp.uint32))
+        # int() makes a variable of what would be a constant to Warp.
+        top = int(1)  # noqa: RUF046, UP018
+        child = int(0)  # noqa: RUF046, UP018
+        steps = int(0)  # noqa: RUF046, UP018
+        sync()
+        while child != wp.static(END_OF_STACK):
+            begin = child & wp.static(WORD_MASK)
+            inner = child >= 0
+            blocks = (child & 7) + 1
+            end = wp.uint32(begin) + wp.uint32(
+                wp.where(inner, wp.static(8 * NODE_WIDTH), blocks * wp.static(BLOCK_WORDS))
+            )
+            steps += 1
+            if steps > tree.step_limit or top > wp.static(entries - NODE_WIDTH) or end > words:
+                tree.error[0] = wp.static(CORRUPT)
+                break
+            if inner:
+                top += visit(units, begin, lane, ray, state.tmax, stack, top) - 1
+                sync()
+                if wp.static(counters):
+                    state.inner_nodes += 1
+            else:
+                tested = test_leaf(units, begin, blocks, lane, stack, ray.tmin, state.best)
+                state.best = tested.best
+                if wp.static(counters):
+                    state.leaves += 1
+                    last = int(min_reduce(wp.uint32(tested.last)))
+                    state.triangles += count_triangles(units, begin, wp.min(blocks, last + 1))
+                if wp.static(in_order):
+                    state.tmax = unsortable(min_reduce(sortable(state.best.t)))
+                elif or_reduce(
+                    wp.where(state.best.prim == wp.static(NO_PRIM), wp.uint32(0), wp.uint32(1))
+                ) != wp.uint32(0):
+                    break
+                top -= 1
+            child = wp.cast(load_word(stack, top), wp.int32)
+            if wp.static(in_order):
+                # Children that have come to lie behind the best hit are passed over.
+                while wp.cast(load_word(stack, entries + top), wp.float32) > state.tmax:
+                    top -= 1
+                    child = wp.cast(load_word(stack, top), wp.int32)
+            sync()
+        return state
+
+    return traverse
+
+
+@wp.func
+def count_triangles(units: wp.uint64, begin: int, blocks: int):
+    """How many triangles the blocks hold."""
+    count = int(0)  # noqa: RUF046, UP018
+    for i in range(blocks * wp.static(BLOCK_WIDTH)):
+        at = begin + (i // wp.static(BLOCK_WIDTH)) * wp.static(BLOCK_WORDS) + wp.static(PRIM_ROW)
+        if wp.cast(load_float(units, at + i % wp.static(BLOCK_WIDTH)), wp.int32) >= 0:
+            count += 1
+    return count
+
+
+@wp.struct
+class TestedLeaf:
+    """A thread's best hit after a leaf, and the block after which it stopped."""
+
+    best: Best
+    last: wp.int32
+
+
+def make_leaf_test(asked: SimpleNamespace, lanes: SimpleNamespace, triangles: SimpleNamespace) -> wp.Function:
+    """The test of a leaf's blocks: one thread takes all, or eight a triangle each of two blocks at a time."""
+    stack_argument = lanes.stack_argument
+    candidates, solve = triangles.candidates, triangles.solve
+    offer, done = asked.offer, asked.done
+    length: int = lanes.triangles_length
+    block_step: int = lanes.block_step
+
+    @without_gradient
+    @wp.func
+    def test_leaf(
+        units: wp.uint64,
+        begin: int,
+        blocks: int,
+        lane: int,
+        stack: stack_argument,
+        tmin: float,
+        best: Best,
+    ) -> TestedLeaf:
+        leaf = TestedLeaf()
+        leaf.best = best
+        leaf.last = 7
+        i = int(lane // wp.static(BLOCK_WIDTH))
+        while i < blocks:
+            block = begin + i * wp.static(BLOCK_WORDS)
+            found = candidates(units, block, lane, stack)
+            left = wp.uint32(found[0])
+            while left != wp.uint32(0):
+                j = lowest_lane(left)
+                negative = ((found[1] >> wp.uint32(j)) & wp.uint32(1)) != wp.uint32(0)
+                left = left & (left - wp.uint32(1))
+                at = block + wp.where(length == 1, lane & 3, j)
+                prim = wp.cast(load_float(units, at + wp.static(PRIM_ROW)), wp.int32)
+                leaf.best = offer(leaf.best, tmin, solve(units, at, stack, negative), prim)
+            if done(leaf.best):
+                leaf.last = i
+                break
+            i += block_step
+        return leaf
+
+    return test_leaf

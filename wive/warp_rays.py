@@ -1,0 +1,131 @@
+"""Rays as Warp arrays on the scene's device: checked, and shared with their owner rather than copied."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import warp as wp
+
+from wive import arguments
+from wive.arrays import NUMPY, library_of
+from wive.rays import Rays
+
+# Limits that nearly every call has: made once for a scene, they cost a call nothing.
+COMMON_LIMITS = (0.0, float("inf"))
+FLOAT_BYTES = 4
+
+
+@dataclass(frozen=True)
+class WarpRays:
+    """Origins and directions (n,) vec3, tmin and tmax (1,) or (n,) float32, on one device."""
+
+    origins: Any
+    directions: Any
+    tmin: Any
+    tmax: Any
+
+    def __len__(self) -> int:
+        """Number of rays."""
+        return len(self.origins)
+
+
+class RayLoader:
+    """Turns what users pass into `WarpRays` on one device."""
+
+    def __init__(self, device: str) -> None:
+        """Make the common limits."""
+        self.device = device
+        self._common = {value: wp.full(1, value, dtype=wp.float32, device=device) for value in COMMON_LIMITS}
+
+    def from_numpy(self, rays: Rays) -> WarpRays:
+        """Checked as for every backend; copied only where the device is not the host."""
+        origins, directions, tmin, tmax = rays.numpy()
+        return WarpRays(
+            wp.array(origins, dtype=wp.vec3, device=self.device, copy=False),
+            wp.array(directions, dtype=wp.vec3, device=self.device, copy=False),
+            self._limit_of_numpy(tmin),
+            self._limit_of_numpy(tmax),
+        )
+
+    def from_device(self, rays: Rays) -> WarpRays:
+        """Arrays on this device, float32 as they are; nothing of them goes through the host."""
+        origins, one_origin = self._vectors("origins", rays.origins)
+        directions, one_direction = self._vectors("directions", rays.directions)
+        count = len(directions) if one_origin else len(origins)
+        if not one_direction and len(directions) != count:
+            raise ValueError(
+                f"origins and directions must be equally many, got {count} and {len(directions)}"
+            )
+        return WarpRays(
+            _vec3_view(origins, count, 0) if one_origin else origins,
+            _vec3_view(directions, count, 0) if one_direction else directions,
+            self._limit("tmin", rays.tmin, count),
+            self._limit("tmax", rays.tmax, count),
+        )
+
+    def _vectors(self, name: str, value: Any) -> tuple[Any, bool]:
+        """(n,) vec3 and False, or the (1,) that all rays share and True."""
+        library = library_of(value)
+        if library is NUMPY:
+            return wp.full(1, wp.vec3(*map(float, value)), dtype=wp.vec3, device=self.device), True
+        array = self._float32(name, value)
+        if array.dtype is wp.vec3 and array.ndim == 1:
+            return array, False
+        if array.dtype is wp.vec3 or array.ndim not in (1, 2) or array.shape[-1] != 3:
+            raise ValueError(
+                f"{name} must have shape (n, 3), or (3,) if all rays share it, got {_shape(array)}"
+            )
+        rows = array if array.strides[-1] == FLOAT_BYTES else array.contiguous()
+        if array.ndim == 1:
+            return _vec3_view(rows, 1, 0), True
+        return _vec3_view(rows, len(rows), rows.strides[0]), False
+
+    def _limit(self, name: str, value: Any, count: int) -> Any:
+        """(1,) or (count,) float32."""
+        if type(value) is float and value in self._common:
+            return self._common[value]
+        if library_of(value) is NUMPY:
+            (number,) = arguments.limits(name, value, 1)
+            return self._limit_of_numpy(np.array([number], np.float32))
+        array = self._float32(name, value)
+        if array.shape not in ((1,), (count,)) or array.dtype is not wp.float32:
+            raise ValueError(
+                f"{name} must be one number or have shape ({count},), one a ray, got shape {_shape(array)}"
+            )
+        return array
+
+    def _limit_of_numpy(self, values: arguments.Float32) -> Any:
+        if len(values) == 1 and float(values[0]) in self._common:
+            return self._common[float(values[0])]
+        if len(values) == 1:
+            return wp.full(1, float(values[0]), dtype=wp.float32, device=self.device)
+        return wp.array(values, dtype=wp.float32, device=self.device, copy=False)
+
+    def _float32(self, name: str, value: Any) -> Any:
+        """The array as Warp's: of float32 or of vec3."""
+        found: object = getattr(value, "dtype", "another type")
+        try:
+            array = library_of(value).to_warp(value, self.device)
+            if array.dtype in (wp.vec3, wp.float32):
+                return array
+            found = wp.types.type_repr(array.dtype)
+        except (RuntimeError, TypeError, ValueError, BufferError):
+            pass  # a type that Warp has no name for: `found` is what its owner calls it
+        raise TypeError(
+            f"{name} must be float32 on a Warp device, where nothing is converted, got {found}: "
+            "convert it first"
+        )
+
+
+def _vec3_view(array: Any, count: int, stride: int) -> Any:
+    """`count` vec3 over the same memory, `stride` bytes apart."""
+    view = wp.array(
+        ptr=array.ptr, dtype=wp.vec3, shape=(count,), strides=(stride,), device=array.device, copy=False
+    )
+    view._owner = array  # lives as long as the view
+    return view
+
+
+def _shape(array: Any) -> tuple[int, ...]:
+    """As its owner sees it: vectors are rows."""
+    return (*array.shape, *getattr(array.dtype, "_shape_", ()))

@@ -1,0 +1,104 @@
+"""Queries on a Warp device: outputs made, kernels launched, on the stream of whoever asked."""
+
+import functools
+from typing import Any
+
+import warp as wp
+
+from wive import _cpu
+from wive.arguments import Float32, Int32, Lanes
+from wive.arrays import NUMPY
+from wive.hits import Hits, Stats, WrappedHits
+from wive.rays import Rays
+from wive.warp_hits import WarpHits
+from wive.warp_kernels import check, launch_any, launch_closest, upload
+from wive.warp_rays import RayLoader, WarpRays
+
+# Below it eight threads a ray keep a GPU busy and answer sooner; above it one thread a ray answers more.
+# An estimate from a prototype; `python -m bench latency --lanes 1,8` on a GPU measures it.
+EIGHT_THREADS_BELOW = 32_768
+
+
+def choose_lanes(asked: Lanes | None, count: int, on_cuda: bool) -> Lanes:
+    """Lanes of a node that one thread owns; None is the better for a batch of `count` rays."""
+    if asked is not None:
+        return asked
+    return 1 if on_cuda and count < EIGHT_THREADS_BELOW else 8
+
+
+class WarpTracer:
+    """The tree on a device, and the queries that `wive.Scene` answers with it."""
+
+    def __init__(self, bvh: _cpu.Bvh, vertices: Float32, faces: Int32, device: str) -> None:
+        """Copy the tree to the device."""
+        self.tree = upload(bvh, device)
+        self.device = device
+        self._vertices, self._faces = vertices, faces
+        self._loader = RayLoader(device)
+
+    def intersect(self, rays: Rays, lanes: Lanes | None, stats: bool) -> tuple[Hits, Stats | None]:
+        """Closest hits, in arrays of the library that the rays came in."""
+        with rays.library.on_stream(self.device):
+            loaded = self._load(rays)
+            t, prim, uv = self._outputs(len(loaded))
+            counts = self._counts(len(loaded), stats)
+            launch_closest(
+                self.tree, *_arrays(loaded), t, prim, uv, stats=counts, lanes=self._lanes(lanes, loaded)
+            )
+            if rays.library is NUMPY:
+                check(self.tree)
+                hits = Hits(t.numpy(), prim.numpy(), uv.numpy(), self._vertices, self._faces)
+                return hits, _numpy_stats(counts)
+            inner = WarpHits(t, prim, uv, self._vertices, self._faces, self.mesh)
+            return WrappedHits(inner, rays.library.from_warp), _stats(counts, rays)
+
+    def occluded(self, rays: Rays, lanes: Lanes | None, stats: bool) -> tuple[Any, Stats | None]:
+        """Whether anything is hit, in an array of the library that the rays came in."""
+        with rays.library.on_stream(self.device):
+            loaded = self._load(rays)
+            mask = wp.empty(len(loaded), dtype=wp.bool, device=self.device)
+            counts = self._counts(len(loaded), stats)
+            launch_any(self.tree, *_arrays(loaded), mask, stats=counts, lanes=self._lanes(lanes, loaded))
+            if rays.library is NUMPY:
+                check(self.tree)
+                return mask.numpy(), _numpy_stats(counts)
+            return rays.library.from_warp(mask), _stats(counts, rays)
+
+    @functools.cached_property
+    def _mesh(self) -> tuple[Any, Any]:
+        vertices = wp.array(self._vertices, dtype=wp.vec3, device=self.device, copy=False)
+        return vertices, wp.array(self._faces, dtype=wp.vec3i, device=self.device, copy=False)
+
+    def mesh(self) -> tuple[Any, Any]:
+        """Vertices (v,) vec3 and faces (f,) vec3i on the device; copied there when first asked for."""
+        return self._mesh
+
+    def _load(self, rays: Rays) -> WarpRays:
+        return self._loader.from_numpy(rays) if rays.library is NUMPY else self._loader.from_device(rays)
+
+    def _lanes(self, asked: Lanes | None, rays: WarpRays) -> Lanes:
+        return choose_lanes(asked, len(rays), self.device != "cpu")
+
+    def _outputs(self, count: int) -> tuple[Any, Any, Any]:
+        t = wp.empty(count, dtype=wp.float32, device=self.device)
+        prim = wp.empty(count, dtype=wp.int32, device=self.device)
+        return t, prim, wp.empty(count, dtype=wp.vec2, device=self.device)
+
+    def _counts(self, count: int, stats: bool) -> Any:
+        return wp.empty(count, dtype=wp.vec3i, device=self.device) if stats else None
+
+
+def _arrays(rays: WarpRays) -> tuple[Any, Any, Any, Any]:
+    return rays.origins, rays.directions, rays.tmin, rays.tmax
+
+
+def _numpy_stats(counts: Any) -> Stats | None:
+    return None if counts is None else Stats(*counts.numpy().T)
+
+
+def _stats(counts: Any, rays: Rays) -> Stats | None:
+    """The columns of (n,) vec3i as three arrays of the library that the rays came in."""
+    if counts is None:
+        return None
+    table = wp.array(ptr=counts.ptr, dtype=wp.int32, shape=(len(counts), 3), device=counts.device, copy=False)
+    return Stats(*(rays.library.from_warp(table[:, column].contiguous()) for column in range(3)))
