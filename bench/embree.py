@@ -145,6 +145,12 @@ def parse_options(options: Sequence[str]) -> argparse.Namespace:
 
 def is_whole(chosen: argparse.Namespace) -> bool:
     """Whether nothing that docs quote was left out."""
-    everything = {"kernels": KERNELS, "in_flight": IN_FLIGHT, "accuracy": ACCURACIES, "rays": KINDS, "parts": PARTS}
+    everything = {
+        "kernels": KERNELS,
+        "in_flight": IN_FLIGHT,
+        "accuracy": ACCURACIES,
+        "rays": KINDS,
+        "parts": PARTS,
+    }
     complete = all(set(getattr(chosen, name)) >= set(values) for name, values in everything.items())
     return complete and not chosen.quick and not chosen.scenes

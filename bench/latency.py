@@ -28,6 +28,7 @@ CURVE_SCENE = 0  # of the scenes asked for: the first, the smallest unless named
 COMPARED_KINDS = ("primary", "diffuse", "random")
 LARGEST_BATCH = 4**11
 QUICK_BATCH = 4**6
+RAYS = 65_536  # compared, of each kind and scene
 QUICK_RAYS = 16_384
 # Calls of one batch size: as many as fit the seconds, but within these bounds.
 FEWEST_CALLS, MOST_CALLS = 3, 2000
@@ -70,7 +71,7 @@ def main(options: Sequence[str]) -> None:
         for name in names:
             mesh = folder.load(name)
             recorded = recorded_rays(mesh)
-            most = QUICK_RAYS if chosen.quick else len(recorded["random"])
+            most = QUICK_RAYS if chosen.quick else RAYS
             sets = [recorded[kind].thinned(most) for kind in COMPARED_KINDS]
             for row in compare_rows(mesh, device, lanes, sets, effort):
                 comparison.append(row)

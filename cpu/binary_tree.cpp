@@ -13,8 +13,8 @@
 namespace wive {
 namespace {
 
-constexpr std::size_t chunk_size = 1 << 14;            // references per step of a parallel split
-constexpr std::uint32_t parallel_range = 1 << 17;      // larger ranges are split by all threads together
+constexpr std::size_t chunk_size = 1 << 13;        // references per step of a parallel split
+constexpr std::uint32_t parallel_range = 1 << 15;  // larger ranges are split by all threads together
 
 struct Halves {
     Range left, right;
@@ -157,29 +157,26 @@ private:
 
     Halves split_alone(const Range& range) const {
         PrimRef* refs = tree_.refs.data();
+        if (!may_choose(range)) return split_by_number(range, refs);
         const BinMap bin_of(range);
-        Split split;
-        if (may_choose(range)) {
-            Bins bins(bin_of.count);
-            bins.add(refs, range.begin, range.end, bin_of);
-            split = best_split(bins, bin_of);
-        }
+        Bins bins(bin_of.count);
+        bins.add(refs, range.begin, range.end, bin_of);
+        const Split split = best_split(bins, bin_of);
         if (split.axis < 0) return split_by_number(range, refs);
-        Box boxes[2], centroids[2];
+        const auto goes_left = [&](Float4v centroid) { return bin_of(centroid, split.axis) < split.bin; };
+        Box left, right;  // of the centroids
         std::uint32_t i = range.begin, j = range.end;
-        while (i < j) {
-            const Float4v centroid = refs[i].centroid();
-            const bool right = bin_of(centroid)[split.axis] >= split.bin;
-            boxes[right].grow(refs[i].box());
-            centroids[right].grow(centroid);
-            if (right)
-                std::swap(refs[i], refs[--j]);
-            else
-                ++i;
+        for (;;) {
+            for (; i < j && goes_left(refs[i].centroid()); ++i) left.grow(refs[i].centroid());
+            for (; i < j && !goes_left(refs[j - 1].centroid()); --j) right.grow(refs[j - 1].centroid());
+            if (i == j) break;
+            left.grow(refs[j - 1].centroid());
+            right.grow(refs[i].centroid());
+            std::swap(refs[i++], refs[--j]);
         }
         Halves halves = start_halves(range, i, split.axis);
-        halves.left.box = boxes[0], halves.left.centroids = centroids[0];
-        halves.right.box = boxes[1], halves.right.centroids = centroids[1];
+        halves.left.box = bins.box_of(split.axis, 0, split.bin), halves.left.centroids = left;
+        halves.right.box = bins.box_of(split.axis, split.bin, bin_of.count), halves.right.centroids = right;
         return halves;
     }
 
@@ -221,7 +218,7 @@ private:
             std::uint32_t next[2] = {left_begin[chunk], right_begin[chunk]};
             for (std::size_t i = range.begin + begin; i < range.begin + end; ++i) {
                 const Float4v centroid = from[i].centroid();
-                const bool side = bin_of(centroid)[split.axis] >= split.bin;
+                const bool side = bin_of(centroid, split.axis) >= split.bin;
                 centroids[chunk][side].grow(centroid);
                 to[next[side]++] = from[i];
             }
@@ -230,8 +227,8 @@ private:
             halves.left.centroids.grow(part[0]);
             halves.right.centroids.grow(part[1]);
         }
-        for (int i = 0; i < bin_of.count; ++i)
-            (i < split.bin ? halves.left : halves.right).box.grow(bins.box[split.axis][i]);
+        halves.left.box = bins.box_of(split.axis, 0, split.bin);
+        halves.right.box = bins.box_of(split.axis, split.bin, bin_of.count);
         return halves;
     }
 

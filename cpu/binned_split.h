@@ -37,6 +37,10 @@ struct BinMap {
     Int4v operator()(Float4v centroid) const {
         return __builtin_convertvector((centroid - base) * scale, Int4v);
     }
+    // The same on one axis alone.
+    int operator()(Float4v centroid, int axis) const {
+        return static_cast<int>((centroid[axis] - base[axis]) * scale[axis]);
+    }
 };
 
 struct Bins {
@@ -59,6 +63,12 @@ struct Bins {
                 ++count[axis][bin[axis]];
             }
         }
+    }
+    // The box of all that falls into bins [begin, end) of an axis.
+    Box box_of(int axis, int begin, int end) const {
+        Box all;
+        for (int i = begin; i < end; ++i) all.grow(box[axis][i]);
+        return all;
     }
     void add(const Bins& other, int bins) {
         for (int axis = 0; axis < 3; ++axis)

@@ -10,8 +10,8 @@ import argparse
 import numpy as np
 import warp as wp
 
-from wive import _cpu
-from wive.warp_kernels import Bvh, any_hit, check, closest_hit, upload
+import wive
+from wive.warp_kernels import Bvh, any_hit, check, closest_hit
 
 SAMPLES = 256
 SIDE = 24
@@ -58,7 +58,7 @@ def main() -> None:
     parser.add_argument("--device", default="cpu", help="a Warp device: cpu, cuda:0, ...")
     device = parser.parse_args().device
 
-    tree = upload(_cpu.Bvh(*tower()), device)
+    tree = wive.Scene(*tower(), device=device).tree
     steps = np.linspace(-5.75, 5.75, SIDE)
     places = np.stack([*np.meshgrid(steps, steps), np.full((SIDE, SIDE), 10.0)], axis=-1).reshape(-1, 3)
     origins = wp.array(places, dtype=wp.vec3, device=device)
