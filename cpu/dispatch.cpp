@@ -34,14 +34,18 @@ struct Entry {
     std::string_view needs;
 };
 
-std::vector<Entry> entries() {
+// Asked once: every query looks its kernels up, and on a virtual machine one CPUID instruction takes microseconds.
+const std::vector<Entry>& entries() {
     constexpr std::string_view avx512 = "AVX-512 F, VL, DQ or BW", avx2 = "AVX2, FMA, BMI1, BMI2, LZCNT or POPCNT";
-    return {{"avx512", avx512_full_kernels(), has_avx512(), avx512},
-            {"avx512.full", avx512_full_kernels(), has_avx512(), avx512},
-            {"avx512.half", avx512_half_kernels(), has_avx512(), avx512},
-            {"avx2", avx2_kernels(), has_avx2(), avx2},
-            {"scalar", scalar_kernels(), true, ""},
-            {"scalar.distance", scalar_by_distance_kernels(), true, ""}};
+    static const std::vector<Entry> all = {
+        {"avx512", avx512_full_kernels(), has_avx512(), avx512},
+        {"avx512.full", avx512_full_kernels(), has_avx512(), avx512},
+        {"avx512.half", avx512_half_kernels(), has_avx512(), avx512},
+        {"avx2", avx2_kernels(), has_avx2(), avx2},
+        {"scalar", scalar_kernels(), true, ""},
+        {"scalar.distance", scalar_by_distance_kernels(), true, ""},
+    };
+    return all;
 }
 
 std::string why_not(const Entry& entry) {
