@@ -1,4 +1,4 @@
-"""The tree that the core builds: complete, conservative, bounded in depth, and the same on any number of threads."""
+"""The tree that the core builds: complete, conservative, bounded in depth, the same on any number of threads."""
 
 import numpy as np
 import pytest
@@ -29,7 +29,9 @@ def walk(bvh: _cpu.Bvh) -> list[tuple[int, int, int, int]]:
             child = int(bvh.nodes[node, 6, lane])
             found.append((node, int(lane), depth, child))
             if child < LEAF:
-                todo.append((child // 64, depth + 1))  # a node is eight units, references count units times eight
+                todo.append(
+                    (child // 64, depth + 1)
+                )  # a node is eight units, references count units times eight
     return found
 
 
@@ -44,7 +46,10 @@ MESHES = {
     "sphere": sphere(4),
     "soup": soup(3000, seed=2),
     "far away": (sphere(3)[0] + np.float32([148376, 1234, -223423]), sphere(3)[1]),
-    "all alike": (np.tile(np.eye(3, dtype=np.float32), (1000, 1)), np.arange(3000, dtype=np.int32).reshape(-1, 3)),
+    "all alike": (
+        np.tile(np.eye(3, dtype=np.float32), (1000, 1)),
+        np.arange(3000, dtype=np.int32).reshape(-1, 3),
+    ),
 }
 
 
@@ -87,7 +92,9 @@ def test_blocks_hold_the_callers_vertices_bit_for_bit() -> None:
     assert np.isnan(rows.transpose(0, 2, 1)[prims < 0]).all()
 
 
-def test_order_is_a_permutation_and_the_opposite_octant_reverses_it(mesh: tuple[np.ndarray, np.ndarray]) -> None:
+def test_order_is_a_permutation_and_the_opposite_octant_reverses_it(
+    mesh: tuple[np.ndarray, np.ndarray],
+) -> None:
     bvh = _cpu.Bvh(*mesh)
     counts = used_lanes(bvh).sum(axis=1)
     for node, count in enumerate(counts):
@@ -109,7 +116,9 @@ def test_order_follows_the_split_axes() -> None:
 
 
 def test_zero_area_triangles_are_left_out_and_keep_their_numbers() -> None:
-    vertices = np.float32([[0, 0, 0], [1, 0, 0], [0, 1, 0], [2, 0, 0], [0.1, 0.1, 0.1], [0.3, 0.3, 0.3], [0.7, 0.7, 0.7]])
+    vertices = np.float32(
+        [[0, 0, 0], [1, 0, 0], [0, 1, 0], [2, 0, 0], [0.1, 0.1, 0.1], [0.3, 0.3, 0.3], [0.7, 0.7, 0.7]]
+    )
     faces = np.int32([[0, 0, 1], [0, 1, 2], [0, 1, 3], [4, 5, 5]])
     bvh = _cpu.Bvh(vertices, faces)
     prims = bvh.blocks[:, 9].view(np.int32)

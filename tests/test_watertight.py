@@ -41,7 +41,9 @@ def test_closed_sphere_never_leaks_at_any_scale(backend: str, kind: str, scale: 
 
 @pytest.mark.parametrize("kind", ["vertices", "edges"])
 @pytest.mark.parametrize("place", PLACES)
-def test_closed_sphere_never_leaks_far_from_the_origin(backend: str, kind: str, place: tuple[float, ...]) -> None:
+def test_closed_sphere_never_leaks_far_from_the_origin(
+    backend: str, kind: str, place: tuple[float, ...]
+) -> None:
     vertices, faces = sphere(4, radius=1000.0)
     vertices = (vertices + np.array(place)).astype(np.float32)
     origins, directions = outwards(vertices, aims(vertices, faces, kind, np.random.default_rng(2)))
@@ -53,7 +55,11 @@ def test_closed_sphere_never_leaks_from_anywhere_inside(backend: str) -> None:
     vertices, faces = sphere(4)
     targets = aims(vertices, faces, "vertices", random)
     origins = (0.5 * random.uniform(-1, 1, targets.shape)).astype(np.float32)
-    assert wive.Scene(vertices, faces, backend=backend).intersect(origins, (targets - origins).astype(np.float32)).mask.all()
+    assert (
+        wive.Scene(vertices, faces, backend=backend)
+        .intersect(origins, (targets - origins).astype(np.float32))
+        .mask.all()
+    )
 
 
 def test_fast_mode_does_leak_so_these_rays_can_tell(backend: str) -> None:
@@ -61,7 +67,9 @@ def test_fast_mode_does_leak_so_these_rays_can_tell(backend: str) -> None:
     leaks = 0
     for kind in ("vertices", "edges"):
         origins, directions = outwards(vertices, aims(vertices, faces, kind, np.random.default_rng(1)))
-        leaks += (~wive.Scene(vertices, faces, backend=backend, accuracy="fast").occluded(origins, directions)).sum()
+        leaks += (
+            ~wive.Scene(vertices, faces, backend=backend, accuracy="fast").occluded(origins, directions)
+        ).sum()
     assert leaks > 0
 
 
@@ -79,7 +87,10 @@ def grid(size: int) -> tuple[np.ndarray, np.ndarray]:
             base = side * np.eye(3, dtype=int)[axis]
             for i in range(size):
                 for j in range(size):
-                    a, b, c, d = (corner(base + x * u + y * v) for x, y in ((i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1)))
+                    a, b, c, d = (
+                        corner(base + x * u + y * v)
+                        for x, y in ((i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1))
+                    )
                     faces += [[a, b, c], [a, c, d]] if side else [[a, c, b], [a, d, c]]
     return np.array(list(corners), np.float32), np.array(faces, np.int32)
 
@@ -98,7 +109,8 @@ def test_axis_rays_through_grid_vertices_cross_the_box_exactly(backend: str) -> 
 
 COMPONENTS = (-1.0, -0.0, 0.0, 1.0)
 DIRECTIONS = np.array(
-    [(x, y, z) for x in COMPONENTS for y in COMPONENTS for z in COMPONENTS if (x, y, z) != (0, 0, 0)], np.float32
+    [(x, y, z) for x in COMPONENTS for y in COMPONENTS for z in COMPONENTS if (x, y, z) != (0, 0, 0)],
+    np.float32,
 )
 
 
@@ -140,7 +152,9 @@ def test_the_nearer_of_two_walls_is_hit_however_thin_the_gap(backend: str, gap: 
     assert walls[0, 2] > walls[4, 2]
     faces = np.int32([[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]])
     random = np.random.default_rng(5)
-    directions = np.append(random.uniform(-0.9, 0.9, (5000, 2)), np.ones((5000, 1)), axis=1).astype(np.float32)
+    directions = np.append(random.uniform(-0.9, 0.9, (5000, 2)), np.ones((5000, 1)), axis=1).astype(
+        np.float32
+    )
     hits = wive.Scene(walls, faces, backend=backend).intersect(np.zeros_like(directions), directions)
     assert (hits.t == 1).all()
     assert (hits.prim >= 2).all()
@@ -157,7 +171,7 @@ def test_of_coincident_triangles_the_lowest_number_is_hit(backend: str) -> None:
 
 
 def test_t_is_the_nearest_float_to_the_exact_distance(backend: str) -> None:
-    # In a plane z = h with directions (x, y, 1) and origins of z = 0, t is h exactly; scaled directions divide it.
+    # In a plane z = 3 from origins of z = 0, t is 3 / z of the direction.
     vertices, faces = np.float32([[-9, -9, 3], [9, -9, 3], [0, 9, 3]]), np.int32([[0, 1, 2]])
     random = np.random.default_rng(7)
     directions = random.uniform(-0.5, 0.5, (4000, 3)).astype(np.float32)
@@ -186,7 +200,9 @@ def test_a_hit_is_found_again_with_tmax_at_its_own_distance(backend: str) -> Non
     flat = np.append(random.uniform(-1, 1, (1200, 2)), 3e-7 * random.standard_normal((1200, 1)), axis=1)
     vertices = (flat @ np.stack([across[1], across[2], across[0]])).astype(np.float32)
     scene = wive.Scene(vertices, np.arange(1200, dtype=np.int32).reshape(-1, 3), backend=backend)
-    ends = np.append(random.uniform(-2, 2, (2, 50_000, 2)), 1e-6 * random.standard_normal((2, 50_000, 1)), axis=2)
+    ends = np.append(
+        random.uniform(-2, 2, (2, 50_000, 2)), 1e-6 * random.standard_normal((2, 50_000, 1)), axis=2
+    )
     points = (ends @ np.stack([across[1], across[2], across[0]])).astype(np.float32)
     origins, directions = points[0], points[1] - points[0]
     hits = scene.intersect(origins, directions)

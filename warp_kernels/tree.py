@@ -84,7 +84,7 @@ def upload(bvh: _cpu.Bvh, device: wp.DeviceLike = None) -> Tree:
 
 def check(tree: Tree) -> None:
     """Wait for the device and raise CorruptTreeError where a kernel could not traverse the tree."""
-    reason = int(tree.error.numpy()[0])  # type: ignore[no-untyped-call]
+    reason = int(tree.error.numpy()[0])
     if reason:
         raise CorruptTreeError(f"tree on {tree.device}: {_REASONS[reason]}")
 

@@ -107,7 +107,7 @@ def watertight_triangles(lanes: SimpleNamespace, kept: int) -> SimpleNamespace:
     @without_gradient
     @wp.func(inline=False)
     def solve(units: wp.uint64, at: int, stack: stack_argument, negative: bool):
-        """t, u and v in double, rounded once; those of the rounded triangle where only rounding let the ray in."""
+        """t, u and v in double, rounded once; of the rounded triangle where only rounding let the ray in."""
         xa = across(units, at, stack, 0)
         ya = across(units, at, stack, 1)
         xb = across(units, at + 12, stack, 0)
