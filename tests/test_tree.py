@@ -1,4 +1,4 @@
-"""The tree that the core builds: complete, conservative, of bounded depth, the same on any number of threads."""
+"""The built tree: complete, conservative, of bounded depth, and the same on any number of threads."""
 
 import numpy as np
 import pytest
