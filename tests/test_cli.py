@@ -4,6 +4,7 @@ import os
 import signal
 import subprocess
 import sys
+import tempfile
 import time
 
 import numpy as np
@@ -245,9 +246,14 @@ def test_a_failed_picture_leaves_the_old_one(ball, tmp_path, capsys, monkeypatch
     assert sorted(path.name for path in tmp_path.iterdir()) == ["ball.npz", "x.png"]
 
 
+# Python looks for modules where it stands: in the repository that would be the source folder, which has no core.
+ELSEWHERE = tempfile.gettempdir()
+
+
 def program(*arguments: object, **options) -> subprocess.Popen[str]:
     command = [sys.executable, "-m", "wive", *map(str, arguments)]
-    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **options)
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+    return subprocess.Popen(command, text=True, cwd=ELSEWHERE, **pipes, **options)
 
 
 def test_the_program_succeeds_and_fails_by_exit_status(tmp_path):

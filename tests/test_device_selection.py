@@ -3,6 +3,7 @@
 import pickle
 import subprocess
 import sys
+import tempfile
 
 import numpy as np
 import pytest
@@ -159,8 +160,14 @@ def test_without_a_fitting_warp_the_way_to_get_it_is_told(monkeypatch, change, r
     assert wive.backends()["warp"].devices == {}
 
 
+# Python looks for modules where it stands: in the repository that would be the source folder, which has no core.
+ELSEWHERE = tempfile.gettempdir()
+
+
 def run_python(code: str) -> str:
-    finished = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
+    finished = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, timeout=60, cwd=ELSEWHERE
+    )
     assert finished.stderr == ""
     assert finished.returncode == 0
     return finished.stdout
@@ -194,6 +201,6 @@ def test_info_names_the_device(tmp_path, capsys, device):
 
 def test_the_test_run_itself_refuses_a_device_that_is_not_there():
     command = [sys.executable, "-m", "pytest", "--device", "cuda:99", "--collect-only", "-q", __file__]
-    finished = subprocess.run(command, capture_output=True, text=True, timeout=60)
+    finished = subprocess.run(command, capture_output=True, text=True, timeout=60, cwd=ELSEWHERE)
     assert finished.returncode == pytest.ExitCode.USAGE_ERROR
     assert "--device: device must be one of " in finished.stderr
