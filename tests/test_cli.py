@@ -246,7 +246,7 @@ def test_a_failed_picture_leaves_the_old_one(ball, tmp_path, capsys, monkeypatch
     assert sorted(path.name for path in tmp_path.iterdir()) == ["ball.npz", "x.png"]
 
 
-# Python looks for modules where it stands: in the repository that would be the source folder, which has no core.
+# Python looks for modules where it stands; in the repository that is the source folder, which has no core.
 ELSEWHERE = tempfile.gettempdir()
 
 

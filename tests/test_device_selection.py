@@ -160,7 +160,7 @@ def test_without_a_fitting_warp_the_way_to_get_it_is_told(monkeypatch, change, r
     assert wive.backends()["warp"].devices == {}
 
 
-# Python looks for modules where it stands: in the repository that would be the source folder, which has no core.
+# Python looks for modules where it stands; in the repository that is the source folder, which has no core.
 ELSEWHERE = tempfile.gettempdir()
 
 
