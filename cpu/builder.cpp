@@ -2,23 +2,23 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <limits>
 #include <stdexcept>
-#include <vector>
+#include <utility>
 
 #include "binary_tree.h"
 #include "emit.h"
 #include "parallel.h"
 
 namespace wive {
+
 Bvh::Bvh(const Mesh& mesh, const BuildOptions& options) : accuracy_(options.accuracy) {
     const unsigned threads = thread_count(options.threads);
     if (mesh.face_count >= leaf_bit) throw std::invalid_argument("faces: too many triangles for one scene");
     check_mesh(mesh, threads);
     std::size_t count = 0;
     LargeArray<PrimRef> refs = make_prim_refs(mesh, threads, count);
-    const BinaryTree tree = 
+    const BinaryTree tree =
         build_binary_tree(std::move(refs), static_cast<std::uint32_t>(count), threads, options.depth_limit);
     for (std::size_t axis = 0; axis < 3; ++axis) {
         bounds_[0][axis] = tree.box.lo[axis];

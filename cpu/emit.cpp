@@ -59,8 +59,10 @@ public:
         std::vector<int> depths(subtrees.size());
         parallel_for(subtrees.size(), threads, [&](std::size_t i) {
             Size at = subtrees[i].first;
-            depths[i] = subtrees[i].slot.leaf ? 0 : emit_subtree(subtrees[i].slot, subtrees[i].node, at);
-            if (subtrees[i].slot.leaf) write_leaf(subtrees[i].slot, at);
+            if (subtrees[i].slot.leaf)
+                write_leaf(subtrees[i].slot, at);
+            else
+                depths[i] = emit_subtree(subtrees[i].slot, subtrees[i].node, at);
         });
         for (std::size_t i = 0; i < subtrees.size(); ++i) depth = std::max(depth, subtrees[i].depth + depths[i]);
         return {std::move(units), total.nodes, total.blocks, depth};

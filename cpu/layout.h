@@ -29,7 +29,6 @@ struct alignas(32) TriangleBlock {
 };
 static_assert(sizeof(TriangleBlock) == 160);
 
-
 // Nodes and blocks stand in one piece of memory, first the nodes, then the blocks, counted in units of 32 bytes:
 // a node is eight units, a block five. A child reference holds the unit where the child begins, times eight; a
 // leaf sets leaf_bit and puts its number of blocks, less one, in the low three bits. So one mask and one shift lead

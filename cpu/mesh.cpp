@@ -1,5 +1,6 @@
 #include "mesh.h"
 
+#include <algorithm>
 #include <atomic>
 #include <cmath>
 #include <limits>

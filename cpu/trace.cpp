@@ -25,8 +25,8 @@ void trace(const KernelTable& table, TraceBatch kernel, const BvhView& bvh, cons
     std::size_t next = 0;
     const RaySource source = {&next, count, rays_per_run};
     const auto work = [&](std::size_t) {
-        const LargeArray<std::byte> scratch(in_flight > 1 ? in_flight * table.flight_bytes : 0);
-        kernel(bvh, rays, hits, source, in_flight, const_cast<std::byte*>(scratch.data()));
+        LargeArray<std::byte> scratch(in_flight > 1 ? in_flight * table.flight_bytes : 0);
+        kernel(bvh, rays, hits, source, in_flight, scratch.data());
     };
     const std::size_t runs = (count + rays_per_run - 1) / rays_per_run;
     const unsigned workers = runs <= 1 ? 1 : static_cast<unsigned>(std::min<std::size_t>(runs, thread_count(threads)));

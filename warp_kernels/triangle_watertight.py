@@ -27,6 +27,14 @@ def edge_of(ax: wp.float64, ay: wp.float64, bx: wp.float64, by: wp.float64):
     return product_double(bx, ay) - product_double(by, ax)
 
 
+@wp.func
+def edges_of(a: wp.vec3d, b: wp.vec3d, c: wp.vec3d):
+    """The edge functions opposite to each corner of a triangle in the sheared space."""
+    return wp.vec3d(
+        edge_of(b[0], b[1], c[0], c[1]), edge_of(c[0], c[1], a[0], a[1]), edge_of(a[0], a[1], b[0], b[1])
+    )
+
+
 def watertight_triangles(lanes: SimpleNamespace, kept: int) -> SimpleNamespace:
     """The test for these lanes, its ray kept from word `kept` of the stack."""
     length: int = lanes.triangles_length
@@ -135,13 +143,11 @@ def watertight_triangles(lanes: SimpleNamespace, kept: int) -> SimpleNamespace:
         a = rounded(units, at, stack)
         b = rounded(units, at + 12, stack)
         c = rounded(units, at + 24, stack)
-        wa = edge_of(b[0], b[1], c[0], c[1])
-        wb = edge_of(c[0], c[1], a[0], a[1])
-        wc = edge_of(a[0], a[1], b[0], b[1])
-        det = wa + wb + wc
-        height = product_double(wa, a[2]) + product_double(wb, b[2]) + product_double(wc, c[2])
+        w = edges_of(a, b, c)
+        det = w[0] + w[1] + w[2]
+        height = product_double(w[0], a[2]) + product_double(w[1], b[2]) + product_double(w[2], c[2])
         t = wp.float32(height / (det * wp.float64(kept_direction(stack, 2))))
-        return wp.vec3(t, wp.float32(wb / det), wp.float32(wc / det))
+        return wp.vec3(t, wp.float32(w[1] / det), wp.float32(w[2] / det))
 
     @without_gradient
     @wp.func(inline=False)
@@ -150,12 +156,10 @@ def watertight_triangles(lanes: SimpleNamespace, kept: int) -> SimpleNamespace:
         a = rounded(units, at, stack)
         b = rounded(units, at + 12, stack)
         c = rounded(units, at + 24, stack)
-        wa = edge_of(b[0], b[1], c[0], c[1])
-        wb = edge_of(c[0], c[1], a[0], a[1])
-        wc = edge_of(a[0], a[1], b[0], b[1])
+        w = edges_of(a, b, c)
         zero = wp.float64(0.0)
-        negative = wp.where(wa < zero or wb < zero or wc < zero, 1, 0)
-        positive = wp.where(wa > zero or wb > zero or wc > zero, 1, 0)
+        negative = wp.where(w[0] < zero or w[1] < zero or w[2] < zero, 1, 0)
+        positive = wp.where(w[0] > zero or w[1] > zero or w[2] > zero, 1, 0)
         return positive - negative
 
     @without_gradient
