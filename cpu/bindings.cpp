@@ -95,13 +95,11 @@ Rays ray_batch(const Array<float>& origins, const Array<float>& directions, cons
             static_cast<std::size_t>(n)};
 }
 
-// Traces the rays with the interpreter lock released. pick: from a kernel table, the query's kernels.
-template <class Pick>
-void trace_released(const PyBvh& self, const std::string& kernel, const Pick& pick, const Rays& rays,
+// Traces the rays with the interpreter lock released.
+void trace_released(const PyBvh& self, const std::string& kernel, QueryKind query, const Rays& rays,
                     const HitBatch& hits, unsigned threads, unsigned in_flight) {
     const KernelTable& table = find_kernels(kernel);
-    const bool counting = hits.stats != nullptr;
-    const TraceBatch batch = pick(table)[static_cast<std::size_t>(self.bvh().accuracy())][counting];
+    const TraceBatch batch = table.find({query, self.bvh().accuracy(), hits.stats != nullptr});
     const BvhView bvh = self.bvh().view();
     py::gil_scoped_release release;
     trace(table, batch, bvh, rays.batch, hits, rays.count, threads, in_flight);
@@ -120,7 +118,7 @@ py::tuple intersect(const PyBvh& self, const std::string& kernel, const Array<fl
     hits.prim = prim.mutable_data();
     hits.uv = uv.mutable_data();
     if (stats) hits.stats = steps.emplace(std::vector<py::ssize_t>{n, 3}).mutable_data();
-    trace_released(self, kernel, [](const KernelTable& table) { return table.closest; }, rays, hits, threads, in_flight);
+    trace_released(self, kernel, QueryKind::closest, rays, hits, threads, in_flight);
     return py::make_tuple(std::move(t), std::move(prim), std::move(uv), std::move(steps));
 }
 
@@ -134,7 +132,7 @@ py::tuple occluded(const PyBvh& self, const std::string& kernel, const Array<flo
     HitBatch hits;
     hits.occluded = mask.mutable_data();
     if (stats) hits.stats = steps.emplace(std::vector<py::ssize_t>{n, 3}).mutable_data();
-    trace_released(self, kernel, [](const KernelTable& table) { return table.any; }, rays, hits, threads, in_flight);
+    trace_released(self, kernel, QueryKind::any, rays, hits, threads, in_flight);
     return py::make_tuple(std::move(mask), std::move(steps));
 }
 

@@ -1,6 +1,10 @@
 // Instantiates a table of kernels; included once in each instruction set's own translation unit.
 #pragma once
 
+#include <algorithm>
+#include <type_traits>
+#include <utility>
+
 #include "in_flight.h"
 #include "kernels.h"
 #include "triangle_fast.h"
@@ -9,17 +13,30 @@
 namespace wive {
 
 template <class Isa, template <class> class Slabs>
+struct KernelMaker {
+    template <QueryKind kind>
+    using Query = std::conditional_t<kind == QueryKind::closest, ClosestHit, AnyHit>;
+
+    template <KernelChoice choice>
+    static constexpr TraceBatch kernel() {
+        using Counters = std::conditional_t<choice.counting, StepCounters, NoCounters>;
+        if constexpr (choice.accuracy == Accuracy::fast)
+            return trace_batch<Isa, Slabs, FastTriangles, Query<choice.query>, Counters>;
+        else
+            return trace_batch<Isa, Slabs, WatertightTriangles, Query<choice.query>, Counters>;
+    }
+
+    template <std::size_t... index>
+    static constexpr KernelTable table(std::string_view name, std::index_sequence<index...>) {
+        return {name,
+                std::max({sizeof(Flight<Isa, Query<kernel_choice(index).query>, StepCounters>)...}),
+                {kernel<kernel_choice(index)>()...}};
+    }
+};
+
+template <class Isa, template <class> class Slabs>
 constexpr KernelTable make_kernel_table(std::string_view name) {
-    return {name,
-            sizeof(Flight<Isa, ClosestHit, StepCounters>),  // the largest
-            {{trace_batch<Isa, Slabs, FastTriangles, ClosestHit, NoCounters>,
-              trace_batch<Isa, Slabs, FastTriangles, ClosestHit, StepCounters>},
-             {trace_batch<Isa, Slabs, WatertightTriangles, ClosestHit, NoCounters>,
-              trace_batch<Isa, Slabs, WatertightTriangles, ClosestHit, StepCounters>}},
-            {{trace_batch<Isa, Slabs, FastTriangles, AnyHit, NoCounters>,
-              trace_batch<Isa, Slabs, FastTriangles, AnyHit, StepCounters>},
-             {trace_batch<Isa, Slabs, WatertightTriangles, AnyHit, NoCounters>,
-              trace_batch<Isa, Slabs, WatertightTriangles, AnyHit, StepCounters>}}};
+    return KernelMaker<Isa, Slabs>::table(name, std::make_index_sequence<kernel_count>());
 }
 
 }  // namespace wive

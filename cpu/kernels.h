@@ -1,12 +1,33 @@
 // The compiled kernels, one table an instruction set and form.
 #pragma once
 
+#include <array>
 #include <string_view>
 
 #include "layout.h"
 #include "ray.h"
 
 namespace wive {
+
+enum class QueryKind { closest, any };
+inline constexpr int query_count = 2;
+
+// What a kernel is made for; each holds the code of exactly that.
+struct KernelChoice {
+    QueryKind query;
+    Accuracy accuracy;
+    bool counting;  // of steps, per ray
+};
+inline constexpr std::size_t kernel_count = query_count * accuracy_count * 2;
+
+constexpr std::size_t kernel_index(KernelChoice choice) {
+    return (static_cast<std::size_t>(choice.query) * accuracy_count + static_cast<std::size_t>(choice.accuracy)) * 2 +
+           choice.counting;
+}
+constexpr KernelChoice kernel_choice(std::size_t index) {
+    return {static_cast<QueryKind>(index / 2 / accuracy_count), static_cast<Accuracy>(index / 2 % accuracy_count),
+            index % 2 != 0};
+}
 
 // One thread's share of a batch: rays come from the source until it is empty. in_flight rays are traced in turns;
 // 1 is plain single-ray traversal. scratch: in_flight * flight_bytes of 64-byte aligned memory where it is above 1.
@@ -15,10 +36,10 @@ using TraceBatch = void (*)(const BvhView&, const RayBatch&, const HitBatch&, co
 
 struct KernelTable {
     std::string_view name;
-    std::size_t flight_bytes;
-    // Indexed by accuracy, then by whether steps are counted. A null pointer: not made for this table.
-    TraceBatch closest[accuracy_count][2];
-    TraceBatch any[accuracy_count][2];
+    std::size_t flight_bytes;  // of the largest kernel
+    std::array<TraceBatch, kernel_count> kernels;
+
+    TraceBatch find(KernelChoice choice) const { return kernels[kernel_index(choice)]; }
 };
 
 // Null where this build has no such kernels; whether the machine can run them is dispatch.h's business.
