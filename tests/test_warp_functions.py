@@ -78,7 +78,7 @@ def trace(kernel: wp.Kernel, tree: warp_kernels.Tree, rays: tuple[np.ndarray, np
     found = hits.numpy()
     uv = np.stack([found["u"], found["v"]], axis=1)
     none = np.zeros((len(found), 3), np.int32)
-    return Answers(found["t"], found["prim"], uv, occluded.numpy(), none, none)
+    return Answers(found["t"], found["prim"], uv, occluded.numpy(), *[none] * 8)
 
 
 @pytest.mark.parametrize("accuracy", KERNELS)
