@@ -64,7 +64,7 @@ private:
         }
         f.index = next_++;
         f.per_ray = typename Triangles<Isa>::PerRay(f.ray);
-        f.query = Query{f.ray.tmin, f.ray.tmax};
+        f.query = query_of<Query>(f.ray, hits_, f.index);
         f.top = Stack::Top(f.stack);
         f.top.child() = inner_child(0);  // the root
         *ends_.node++ = &f;
