@@ -153,7 +153,7 @@ def limits(name: str, value: ArrayLike, count: int) -> Float32:
 
 
 def _is_ready(value: ArrayLike) -> TypeGuard[Float32]:
-    """Whether it is an (n,3) array as the core takes it; asked first, because checks are most of a small call."""
+    """Whether it is an (n,3) array as the core takes it: checks are most of a small call."""
     return (
         type(value) is np.ndarray
         and value.dtype is FLOAT32
