@@ -124,6 +124,14 @@ def test_points_of_a_grid_are_told_apart_in_a_cube_with_a_cavity():
     np.testing.assert_array_equal(mesh.contains(np.zeros((0, 3))), np.zeros(0, bool))
 
 
+def test_what_trimesh_computes_with_rays_works_on_ours():
+    mesh, ours = own(*sphere(3))
+    mesh.ray = ours
+    points, faces = trimesh.sample.sample_surface(mesh, 200, seed=6)
+    found = trimesh.proximity.thickness(mesh, points, normals=mesh.face_normals[faces], method="ray")
+    np.testing.assert_allclose(found, 2, atol=0.02)
+
+
 def test_changes_of_the_mesh_are_followed():
     mesh, ours = own(*sphere(2))
     ray = [[0.0, 0, 0]], [[0.0, 0, 1]]
