@@ -11,9 +11,9 @@
 
 namespace wive {
 
-template <class Isa, class Query, class Counters>
+template <class Frame, class Query, class Counters>
 struct alignas(64) Flight {
-    RayFrame<Isa> ray;
+    Frame ray;
     Query query{0, 0};
     Counters counters;
     Stack::Top top;
@@ -37,7 +37,7 @@ struct Waiting {
 template <class Isa, template <class> class Slabs, template <class> class Triangles, class Query, class Counters>
 class InFlight {
 public:
-    using State = Flight<Isa, Query, Counters>;
+    using State = Flight<typename Triangles<Isa>::Frame, Query, Counters>;
 
     [[gnu::always_inline]] InFlight(const BvhView& bvh, const RayBatch& rays, const HitBatch& hits,
                                     const RaySource& source, std::byte* scratch)

@@ -7,6 +7,8 @@
 
 #include "in_flight.h"
 #include "kernels.h"
+#include "query_exact.h"
+#include "triangle_exact.h"
 #include "triangle_fast.h"
 #include "triangle_watertight.h"
 
@@ -17,20 +19,31 @@ struct KernelMaker {
     template <QueryKind kind>
     using Query = std::conditional_t<kind == QueryKind::closest, ClosestHit, AnyHit>;
 
+    template <template <class> class Triangles, class Query, bool counting>
+    struct Kernel {
+        static constexpr TraceBatch trace =
+            trace_batch<Isa, Slabs, Triangles, Query, std::conditional_t<counting, StepCounters, NoCounters>>;
+        static constexpr std::size_t flight_bytes = sizeof(Flight<typename Triangles<Isa>::Frame, Query, StepCounters>);
+    };
+
     template <KernelChoice choice>
-    static constexpr TraceBatch kernel() {
-        using Counters = std::conditional_t<choice.counting, StepCounters, NoCounters>;
+    static constexpr auto kernel() {
+        using Asked = Query<choice.query>;
         if constexpr (choice.accuracy == Accuracy::fast)
-            return trace_batch<Isa, Slabs, FastTriangles, Query<choice.query>, Counters>;
+            return Kernel<FastTriangles, Asked, choice.counting>{};
+        else if constexpr (choice.accuracy == Accuracy::watertight)
+            return Kernel<WatertightTriangles, Asked, choice.counting>{};
+        else if constexpr (choice.query == QueryKind::closest)
+            return Kernel<ExactTriangles, ExactClosestHit, choice.counting>{};
         else
-            return trace_batch<Isa, Slabs, WatertightTriangles, Query<choice.query>, Counters>;
+            return Kernel<ExactTriangles, Asked, choice.counting>{};
     }
 
     template <std::size_t... index>
     static constexpr KernelTable table(std::string_view name, std::index_sequence<index...>) {
         return {name,
-                std::max({sizeof(Flight<Isa, Query<kernel_choice(index).query>, StepCounters>)...}),
-                {kernel<kernel_choice(index)>()...}};
+                std::max({decltype(kernel<kernel_choice(index)>())::flight_bytes...}),
+                {decltype(kernel<kernel_choice(index)>())::trace...}};
     }
 };
 

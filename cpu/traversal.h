@@ -87,7 +87,8 @@ template <bool in_order, class Isa, template <class> class Slabs>
 }
 
 template <class Isa, template <class> class Slabs, template <class> class Triangles, class Query, class Counters>
-[[gnu::noinline]] void traverse(const BvhView& bvh, const RayFrame<Isa>& ray, Query& result, Counters& counters) {
+[[gnu::noinline]] void traverse(const BvhView& bvh, const typename Triangles<Isa>::Frame& ray, Query& result,
+                                Counters& counters) {
     const Slabs<Isa> slabs(ray);
     const Triangles<Isa> triangles(ray);
     Query query{ray.tmin, ray.tmax};
@@ -123,7 +124,7 @@ template <class Isa, template <class> class Slabs, template <class> class Triang
 void trace_one_by_one(const BvhView& bvh, const RayBatch& rays, const HitBatch& hits, const RaySource& source) {
     for (std::size_t begin, end; source.take(begin, end);)
         for (std::size_t i = begin; i < end; ++i) {
-            RayFrame<Isa> ray;
+            typename Triangles<Isa>::Frame ray;
             Query query{0, 0};
             Counters counters;
             ray.scale = 1;

@@ -11,6 +11,8 @@ class FastTriangles {
     using Float4 = typename Isa::Float4;
 
 public:
+    using Frame = RayFrame<Isa>;
+
     [[gnu::always_inline]] explicit FastTriangles(const RayFrame<Isa>& ray) {
         for (int axis = 0; axis < 3; ++axis) {
             origin_[axis] = Float4::all(ray.origin[axis]);

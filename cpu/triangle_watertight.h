@@ -20,6 +20,8 @@ class WatertightTriangles {
     using Double4 = typename Isa::Double4;
 
 public:
+    using Frame = RayFrame<Isa>;
+
     [[gnu::always_inline]] explicit WatertightTriangles(const RayFrame<Isa>& ray) : ray_(ray) {
         constexpr unsigned following = 0b001001;  // the axis after axis i, two bits each
         axis_[2] = ray.longest_axis;
