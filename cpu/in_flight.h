@@ -62,14 +62,14 @@ private:
                 end_ = next_;
                 return;
             }
-            f.query = Query{0, 0};
+            new (&f.query) Query{0, 0};  // in place: a temporary copied over would stall on its own stores
             f.counters = Counters{};
             if (f.ray.load(bvh_, rays_, next_)) break;
             f.query.write(hits_, next_, 1);
             f.counters.write(hits_, next_);
         }
         f.index = next_++;
-        f.query = Query{f.ray.tmin, f.ray.tmax};
+        new (&f.query) Query{f.ray.tmin, f.ray.tmax};
         f.top = Stack::Top(f.stack);
         f.top.child() = inner_child(0);  // the root
         at_node_.add_if(true, &f);

@@ -14,31 +14,43 @@ namespace wive {
 // differ by more than float's range is not exact, and t has to be rounded in the caller's units.
 template <class Isa>
 struct ExactFrame : RayFrame<Isa> {
-    GivenRay given;
+    float given_direction[3];
     float given_tmin, given_tmax;
-    float unscale;         // t here = unscale * t of the caller's ray
-    double shear[2];       // the direction on the other two axes over that on the longest
-    double inverse;        // 1 / the direction on the longest axis
-    double error;          // 40 e M, M no less than any corner's distance from the origin along an axis
+    float unscale;     // t here = unscale * t of the caller's ray
+    unsigned axis[3];  // the direction's longest axis last; the numbers below are in this order
+    double from[3];    // the origin
+    double shear[2];   // the direction over that on the longest axis
+    double inverse;    // 1 / the direction on the longest axis
+    double bound;      // no weight in the whole tree is off by more
 
     [[gnu::always_inline]] bool load(const BvhView& bvh, const RayBatch& rays, std::size_t i) {
         if (!RayFrame<Isa>::load(bvh, rays, i)) [[unlikely]] return false;
-        float reach = 0;
-        for (std::size_t axis = 0; axis < 3; ++axis) {
-            given.origin[axis] = rays.origins[3 * i + axis];
-            given.direction[axis] = rays.directions[3 * i + axis];
-            reach = std::fmax(reach, bvh.extent[axis] + std::fabs(given.origin[axis] - bvh.center[axis]));
+        using Float4 = typename Isa::Float4;
+        constexpr unsigned following = 0b001001;  // the axis after axis i, two bits each
+        axis[2] = this->longest_axis;
+        axis[0] = following >> 2 * axis[2] & 3u;
+        axis[1] = following >> 2 * axis[0] & 3u;
+        const float *o = rays.origins + 3 * i, *d = rays.directions + 3 * i;
+        for (int k = 0; k < 3; ++k) {
+            given_direction[k] = d[k];
+            from[k] = o[axis[k]];
         }
         given_tmin = rays.tmin[i * rays.tmin_stride];
         given_tmax = rays.tmax[i * rays.tmax_stride];
         unscale = 1.0f / this->scale;
-        const unsigned z = this->longest_axis, x = z == 2 ? 0 : z + 1, y = x == 2 ? 0 : x + 1;
-        const double forward = given.direction[z];
-        shear[0] = slope(given.direction[x] / forward);
-        shear[1] = slope(given.direction[y] / forward);
-        inverse = 1.0 / forward;
-        error = 40 * 0x1p-53 * (1 + 0x1p-20) * reach;  // the last factor for reach's own rounding
+        inverse = 1.0 / d[axis[2]];
+        shear[0] = slope(d[axis[0]] * inverse);
+        shear[1] = slope(d[axis[1]] * inverse);
+        // 96 e M^2, M no less than the distance of any corner from the origin along an axis.
+        const Float4 relative = Float4::load(this->origin) - Float4::load(bvh.center);
+        const double reach = highest_lane(Float4::load(bvh.extent) + abs(relative));
+        bound = 97 * 0x1p-53 * reach * reach;  // one more for reach's own rounding
         return true;
+    }
+
+    GivenRay given() const {
+        return {{this->origin[0], this->origin[1], this->origin[2]},
+                {given_direction[0], given_direction[1], given_direction[2]}};
     }
 
 private:
@@ -54,12 +66,7 @@ class ExactTriangles {
 public:
     using Frame = ExactFrame<Isa>;
 
-    [[gnu::always_inline]] explicit ExactTriangles(const Frame& ray) : ray_(ray) {
-        constexpr unsigned following = 0b001001;  // the axis after axis i, two bits each
-        axis_[2] = ray.longest_axis;
-        axis_[0] = following >> 2 * axis_[2] & 3u;
-        axis_[1] = following >> 2 * axis_[0] & 3u;
-    }
+    [[gnu::always_inline]] explicit ExactTriangles(const Frame& ray) : ray_(ray) {}
 
     // Offers every hit of the block to the query; true once the query is done.
     template <class Query>
@@ -67,9 +74,7 @@ public:
         Double4 x[3], y[3], z[3], weight[3];
         const Double4 shear_x = Double4::all(ray_.shear[0]), shear_y = Double4::all(ray_.shear[1]);
         for (int k = 0; k < 3; ++k) {
-            const auto away = [&](int i) {
-                return corners(block, k, axis_[i]) - Double4::all(double{ray_.given.origin[axis_[i]]});
-            };
+            const auto away = [&](int i) { return corners(block, k, ray_.axis[i]) - Double4::all(ray_.from[i]); };
             z[k] = away(2);
             x[k] = away(0) - shear_x * z[k];
             y[k] = away(1) - shear_y * z[k];
@@ -80,10 +85,7 @@ public:
         }
         const Double4 low = min(min(weight[0], weight[1]), weight[2]);
         const Double4 high = max(max(weight[0], weight[1]), weight[2]);
-        // No weight is off by more than 81 e M^2, wherever the triangle lies.
-        const double reach_error = ray_.error * (ray_.error * (0x1p53 / 40));
-        const double bound = 2.025 * reach_error;
-        const unsigned lanes = less_equal(Double4::all(-bound), low) | less_equal(high, Double4::all(bound));
+        const unsigned lanes = less_equal(Double4::all(-ray_.bound), low) | less_equal(high, Double4::all(ray_.bound));
         if (lanes == 0) [[likely]] return false;
         return solve(block, lanes, x, y, z, weight, low, high, query);
     }
@@ -103,20 +105,23 @@ private:
     [[gnu::always_inline]] bool solve(const TriangleBlock& block, unsigned lanes, const Double4 (&x)[3],
                                       const Double4 (&y)[3], const Double4 (&z)[3], const Double4 (&weight)[3],
                                       Double4 low, Double4 high, Query& query) const {
-        // The bound again for triangles as far off the ray as these.
+        constexpr double e = 0x1p-53;
+        // The error of these weights: e (r + 4 e Z) (13 r + 21 Z).
+        const Double4 near = min(min(z[0], z[1]), z[2]), far = max(max(z[0], z[1]), z[2]);
+        const Double4 along = max(abs(near), abs(far));
         Double4 aside = max(abs(x[0]), abs(y[0]));
         for (int k = 1; k < 3; ++k) aside = max(aside, max(abs(x[k]), abs(y[k])));
-        const Double4 error = Double4::all(ray_.error) * (aside + Double4::all(0.125 * ray_.error));
+        const Double4 error = (aside + Double4::all(4 * e) * along) *
+                              (Double4::all(13 * e) * aside + Double4::all(21 * e) * along);
         const Double4 minus_error = Double4::all(0.0) - error;
         lanes &= less_equal(minus_error, low) | less_equal(high, error);
         if (lanes == 0) return false;
 
         unsigned doubt = less_equal(low, error) & less_equal(minus_error, high);
         const Double4 share = Double4::all(1.0) / (weight[0] + weight[1] + weight[2]);
-        const Double4 near = min(min(z[0], z[1]), z[2]), far = max(max(z[0], z[1]), z[2]);
         const Double4 depth = (weight[0] * z[0] + weight[1] * z[1] + weight[2] * z[2]) * share;
         const Double4 weight_error = Double4::all(6.0) * error * abs(share);
-        const Double4 depth_error = weight_error * (far - near) + Double4::all(12 * 0x1p-53) * max(abs(near), abs(far));
+        const Double4 depth_error = weight_error * (far - near) + Double4::all(12 * e) * along;
         alignas(16) float ts[4], us[4] = {}, vs[4] = {};
         const Double4 inverse = Double4::all(ray_.inverse);
         doubt |= round(depth * inverse, depth_error * abs(inverse), ts);
@@ -128,7 +133,7 @@ private:
             const int lane = __builtin_ctz(lanes);
             HitNumbers hit = {ts[lane], us[lane], vs[lane]};
             if (doubt >> lane & 1u) [[unlikely]] {
-                if (!hits_exactly(ray_.given, corners_of(block, lane), counts_crossings<Query>(), hit)) continue;
+                if (!hits_exactly(ray_.given(), corners_of(block, lane), counts_crossings<Query>(), hit)) continue;
             }
             if (!within_limits(block, lane, hit.t)) continue;
             if (offer(block, lane, hit, query)) return true;
@@ -155,9 +160,9 @@ private:
     [[gnu::always_inline]] bool within_limits(const TriangleBlock& block, int lane, float t) const {
         if (t < ray_.given_tmin || t > ray_.given_tmax) return false;
         if (t == ray_.given_tmin) [[unlikely]]
-            if (compare_with_limit(ray_.given, corners_of(block, lane), t) < 0) return false;
+            if (compare_with_limit(ray_.given(), corners_of(block, lane), t) < 0) return false;
         if (t == ray_.given_tmax) [[unlikely]]
-            if (compare_with_limit(ray_.given, corners_of(block, lane), t) > 0) return false;
+            if (compare_with_limit(ray_.given(), corners_of(block, lane), t) > 0) return false;
         return true;
     }
 
@@ -165,14 +170,13 @@ private:
     [[gnu::always_inline]] bool offer(const TriangleBlock& block, int lane, const HitNumbers& hit, Query& query) const {
         if constexpr (Query::in_order)
             return query.take(hit, block, lane, ray_.unscale, [&](const TriangleBlock& other, int other_lane) {
-                return compare_distances(ray_.given, corners_of(block, lane), corners_of(other, other_lane));
+                return compare_distances(ray_.given(), corners_of(block, lane), corners_of(other, other_lane));
             });
         else
             return query.take(hit.t, hit.u, hit.v, static_cast<std::uint32_t>(block.prim[lane]));
     }
 
     const Frame& ray_;
-    std::size_t axis_[3];  // the direction's longest axis last
 };
 
 }  // namespace wive
