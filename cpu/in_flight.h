@@ -69,7 +69,7 @@ private:
             f.counters.write(hits_, next_);
         }
         f.index = next_++;
-        new (&f.query) Query{f.ray.tmin, f.ray.tmax};
+        new (&f.query) Query(query_of<Query>(f.ray, hits_, f.index));
         f.top = Stack::Top(f.stack);
         f.top.child() = inner_child(0);  // the root
         at_node_.add_if(true, &f);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <tuple>
 #include <type_traits>
 #include <utility>
 
@@ -17,7 +18,7 @@ namespace wive {
 template <class Isa, template <class> class Slabs>
 struct KernelMaker {
     template <QueryKind kind>
-    using Query = std::conditional_t<kind == QueryKind::closest, ClosestHit, AnyHit>;
+    using Query = std::tuple_element_t<static_cast<std::size_t>(kind), std::tuple<ClosestHit, AnyHit, AllHits, CountHits>>;
 
     template <template <class> class Triangles, class Query, bool counting>
     struct Kernel {

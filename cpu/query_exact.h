@@ -11,6 +11,7 @@ namespace wive {
 // order of what it does not make equal; what it does is compared exactly, so the best hit's triangle is remembered.
 struct ExactClosestHit {
     static constexpr bool in_order = true;
+    static constexpr bool crossings = false;
     static constexpr bool wants_uv = true;
 
     float tmin, tmax;  // for the boxes, in the frame's units; tmax shrinks to the best hit

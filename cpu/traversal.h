@@ -8,6 +8,7 @@
 #include "frame.h"
 #include "layout.h"
 #include "query.h"
+#include "query_all.h"
 #include "ray.h"
 #include "stack.h"
 
@@ -86,12 +87,21 @@ template <bool in_order, class Isa, template <class> class Slabs>
     return lanes.last_hit();
 }
 
+// What ray i asks, before anything is found. Only the query for every hit knows whose hits they are.
+template <class Query, class Isa>
+[[gnu::always_inline]] inline Query query_of(const RayFrame<Isa>& ray, const HitBatch& hits, std::size_t i) {
+    if constexpr (requires { &Query::found; })
+        return {.tmin = ray.tmin, .tmax = ray.tmax, .scale = ray.scale, .ray = i, .found = hits.found};
+    else
+        return {ray.tmin, ray.tmax};
+}
+
 template <class Isa, template <class> class Slabs, template <class> class Triangles, class Query, class Counters>
 [[gnu::noinline]] void traverse(const BvhView& bvh, const typename Triangles<Isa>::Frame& ray, Query& result,
                                 Counters& counters) {
     const Slabs<Isa> slabs(ray);
     const Triangles<Isa> triangles(ray);
-    Query query{ray.tmin, ray.tmax};
+    Query query = result;
     Stack stack;
     Stack::Top top(stack);
     std::uint32_t child = inner_child(0);  // the root
@@ -128,7 +138,10 @@ void trace_one_by_one(const BvhView& bvh, const RayBatch& rays, const HitBatch& 
             Query query{0, 0};
             Counters counters;
             ray.scale = 1;
-            if (ray.load(bvh, rays, i)) traverse<Isa, Slabs, Triangles>(bvh, ray, query, counters);
+            if (ray.load(bvh, rays, i)) {
+                query = query_of<Query>(ray, hits, i);
+                traverse<Isa, Slabs, Triangles>(bvh, ray, query, counters);
+            }
             query.write(hits, i, ray.scale);
             counters.write(hits, i);
         }

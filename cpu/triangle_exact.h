@@ -133,20 +133,12 @@ private:
             const int lane = __builtin_ctz(lanes);
             HitNumbers hit = {ts[lane], us[lane], vs[lane]};
             if (doubt >> lane & 1u) [[unlikely]] {
-                if (!hits_exactly(ray_.given(), corners_of(block, lane), counts_crossings<Query>(), hit)) continue;
+                if (!hits_exactly(ray_.given(), corners_of(block, lane), Query::crossings, hit)) continue;
             }
             if (!within_limits(block, lane, hit.t)) continue;
             if (offer(block, lane, hit, query)) return true;
         }
         return false;
-    }
-
-    template <class Query>
-    static consteval bool counts_crossings() {
-        if constexpr (requires { Query::crossings; })
-            return Query::crossings;
-        else
-            return false;
     }
 
     // Rounds x to float; the lanes in which a number within the error of x rounds otherwise.
