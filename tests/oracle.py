@@ -45,17 +45,17 @@ def meetings(
     directions: np.ndarray,
     moved: bool = False,
 ) -> Meetings:
-    """All lines against all triangles. `moved`: the origins are moved by (e, e^2, e^3), e = 2^-500.
+    """All lines against all triangles. `moved`: the origins are moved by (e, e^2, e^3), e = 2^-60.
 
-    Where numbers have few bits, that is near enough to zero to change no sign that is not zero.
+    Where coordinates are multiples of 1/4 and below 32, that changes no sign that is not zero.
     """
-    unit, direction_unit = (unit_of(vertices, origins), unit_of(directions))
+    unit, direction_unit = unit_of(vertices, origins), unit_of(directions)
     o = integers(origins, unit)[:, None]
     corners = integers(vertices, unit)[faces]
     if moved:
-        unit -= 1500
-        o, corners = o * 2**1500, corners * 2**1500
-        o = o + np.array([2**1000, 2**500, 1], object) * 2**24  # 2^24: a unit is less than one bit of a number
+        unit -= 180
+        o, corners = o * 2**180, corners * 2**180
+        o = o + np.array([2 ** (power - unit) for power in (-60, -120, -180)], object)
     a, b, c = corners.swapaxes(0, 1)[:, None]
     d = integers(directions, direction_unit)[:, None]
     normal = cross(b - a, c - a)
