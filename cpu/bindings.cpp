@@ -40,8 +40,13 @@ void expect_shape(const Array<T>& array, py::ssize_t columns, const char* messag
 
 Accuracy parse_accuracy(const std::string& name) {
     if (name == "fast") return Accuracy::fast;
-    expect(name == "watertight", "accuracy: expected 'fast' or 'watertight'");
-    return Accuracy::watertight;
+    if (name == "watertight") return Accuracy::watertight;
+    expect(name == "exact", "accuracy: expected 'fast', 'watertight' or 'exact'");
+    return Accuracy::exact;
+}
+
+const char* accuracy_name(Accuracy accuracy) {
+    return accuracy == Accuracy::fast ? "fast" : accuracy == Accuracy::watertight ? "watertight" : "exact";
 }
 
 ChildOrder parse_order(const std::string& name) {
@@ -264,7 +269,7 @@ PYBIND11_MODULE(_cpu, m, py::mod_gil_not_used()) {
             return py::array_t<float>({2, 3}, self.bvh().bounds()[0].data());
         })
         .def_property_readonly("accuracy", [](const PyBvh& self) {
-            return self.bvh().accuracy() == Accuracy::fast ? "fast" : "watertight";
+            return accuracy_name(self.bvh().accuracy());
         })
         .def_property_readonly("depth", [](const PyBvh& self) { return self.bvh().depth(); })
         .def_property_readonly("memory", [](const PyBvh& self) {

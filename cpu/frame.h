@@ -82,4 +82,19 @@ struct RayFrame {
     }
 };
 
+// With the axes of a space in which the ray runs along the third, the longest of its direction.
+template <class Isa>
+struct AxisFrame : RayFrame<Isa> {
+    std::uint32_t axis[3];
+
+    [[gnu::always_inline]] bool load(const BvhView& bvh, const RayBatch& rays, std::size_t i) {
+        if (!RayFrame<Isa>::load(bvh, rays, i)) [[unlikely]] return false;
+        constexpr unsigned following = 0b001001;  // the axis after axis i, two bits each
+        axis[2] = this->longest_axis;
+        axis[0] = following >> 2 * axis[2] & 3u;
+        axis[1] = following >> 2 * axis[0] & 3u;
+        return true;
+    }
+};
+
 }  // namespace wive

@@ -11,10 +11,9 @@
 
 namespace wive {
 
-template <class Isa, template <class> class Triangles, class Query, class Counters>
+template <class Frame, class Query, class Counters>
 struct alignas(64) Flight {
-    RayFrame<Isa> ray;
-    [[no_unique_address]] typename Triangles<Isa>::PerRay per_ray;
+    Frame ray;
     Query query{0, 0};
     [[no_unique_address]] Counters counters;
     Stack::Top top;
@@ -25,7 +24,7 @@ struct alignas(64) Flight {
 template <class Isa, template <class> class Slabs, template <class> class Triangles, class Query, class Counters>
 class InFlight {
 public:
-    using State = Flight<Isa, Triangles, Query, Counters>;
+    using State = Flight<typename Triangles<Isa>::Frame, Query, Counters>;
 
     [[gnu::always_inline]] InFlight(const BvhView& bvh, const RayBatch& rays, const HitBatch& hits,
                                     const RaySource& source, std::byte* scratch)
@@ -56,15 +55,14 @@ private:
                 end_ = next_;
                 return;
             }
-            f.query = Query{0, 0};
+            new (&f.query) Query{0, 0};  // in place: a temporary copied over would stall on its own stores
             f.counters = Counters{};
             if (f.ray.load(bvh_, rays_, next_)) break;
             f.query.write(hits_, next_, 1);
             f.counters.write(hits_, next_);
         }
         f.index = next_++;
-        f.per_ray = typename Triangles<Isa>::PerRay(f.ray);
-        f.query = query_of<Query>(f.ray, hits_, f.index);
+        new (&f.query) Query(query_of<Query>(f.ray, hits_, f.index));
         f.top = Stack::Top(f.stack);
         f.top.child() = inner_child(0);  // the root
         *ends_.node++ = &f;
@@ -109,7 +107,7 @@ private:
             const std::uint32_t child = top.child();
             f.counters.leaf();
             const bool finished = test_leaf(bvh.leaf(child), leaf_block_count(child),
-                                            Triangles<Isa>(f.ray, f.per_ray), f.query, f.counters);
+                                            Triangles<Isa>(f.ray), f.query, f.counters);
             if (finished) top = Stack::Top(f.stack);
             top.move(-1);
             wait(bvh, f, top, ends);

@@ -8,6 +8,8 @@
 
 #include "in_flight.h"
 #include "kernels.h"
+#include "query_exact.h"
+#include "triangle_exact.h"
 #include "triangle_fast.h"
 #include "triangle_watertight.h"
 
@@ -18,21 +20,31 @@ struct KernelMaker {
     template <QueryKind kind>
     using Query = std::tuple_element_t<static_cast<std::size_t>(kind), std::tuple<ClosestHit, AnyHit, AllHits, CountHits>>;
 
-    template <KernelChoice choice, template <class> class Triangles>
-    struct Made {
-        using Counters = std::conditional_t<choice.counting, StepCounters, NoCounters>;
-        static constexpr TraceBatch kernel = trace_batch<Isa, Slabs, Triangles, Query<choice.query>, Counters>;
-        static constexpr std::size_t flight_bytes = sizeof(Flight<Isa, Triangles, Query<choice.query>, Counters>);
+    template <template <class> class Triangles, class Query, bool counting>
+    struct Kernel {
+        static constexpr TraceBatch trace =
+            trace_batch<Isa, Slabs, Triangles, Query, std::conditional_t<counting, StepCounters, NoCounters>>;
+        static constexpr std::size_t flight_bytes = sizeof(Flight<typename Triangles<Isa>::Frame, Query, StepCounters>);
     };
+
     template <KernelChoice choice>
-    using Maker = std::conditional_t<choice.accuracy == Accuracy::fast, Made<choice, FastTriangles>,
-                                     Made<choice, WatertightTriangles>>;
+    static constexpr auto kernel() {
+        using Asked = Query<choice.query>;
+        if constexpr (choice.accuracy == Accuracy::fast)
+            return Kernel<FastTriangles, Asked, choice.counting>{};
+        else if constexpr (choice.accuracy == Accuracy::watertight)
+            return Kernel<WatertightTriangles, Asked, choice.counting>{};
+        else if constexpr (choice.query == QueryKind::closest)
+            return Kernel<ExactTriangles, ExactClosestHit, choice.counting>{};
+        else
+            return Kernel<ExactTriangles, Asked, choice.counting>{};
+    }
 
     template <std::size_t... index>
     static constexpr KernelTable table(std::string_view name, std::index_sequence<index...>) {
         return {name,
-                std::max({Maker<kernel_choice(index)>::flight_bytes...}),
-                {Maker<kernel_choice(index)>::kernel...}};
+                std::max({decltype(kernel<kernel_choice(index)>())::flight_bytes...}),
+                {decltype(kernel<kernel_choice(index)>())::trace...}};
     }
 };
 

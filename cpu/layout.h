@@ -21,7 +21,7 @@ struct alignas(64) Node {
 static_assert(sizeof(Node) == 256);
 inline constexpr std::uint32_t row_bytes = sizeof(Node::planes[0]);
 
-// Four triangles side by side. rows[3 * k + axis] holds vertex k (watertight), or v0, v1 - v0, v2 - v0 (fast).
+// Four triangles side by side. rows[3 * k + axis] holds vertex k, or v0, v1 - v0, v2 - v0 (fast).
 // Unused lanes hold NaN, which passes no test, and prim -1.
 struct alignas(32) TriangleBlock {
     float rows[9][block_width];
@@ -52,8 +52,8 @@ constexpr std::uint32_t leaf_block_count(std::uint32_t child) { return (child & 
 inline constexpr int max_depth = 64;
 inline constexpr int max_stack = 1 + 7 * max_depth;
 
-enum class Accuracy { fast, watertight };
-inline constexpr int accuracy_count = 2;
+enum class Accuracy { fast, watertight, exact };
+inline constexpr int accuracy_count = 3;
 
 struct BvhView {
     const std::byte* units;  // begins with the root, always an inner node

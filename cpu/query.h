@@ -54,6 +54,9 @@ struct AnyHit {
         hit = t >= tmin && t <= tmax;
         return hit;
     }
+    // A hit that is known to lie within, t in the caller's units, as exact mode has it.
+    static constexpr bool wants_uv = false;
+    [[gnu::always_inline]] bool take(float, float, float, std::uint32_t) { return hit = true; }
     [[gnu::always_inline]] void write(const HitBatch& hits, std::size_t i, float) const { hits.occluded[i] = hit; }
 };
 

@@ -18,6 +18,12 @@ struct CountHits {
         count += t >= tmin && t <= tmax;
         return false;
     }
+    // A hit that is known to lie within, t in the caller's units, as exact mode has it.
+    static constexpr bool wants_uv = false;
+    [[gnu::always_inline]] bool take(float, float, float, std::uint32_t) {
+        ++count;
+        return false;
+    }
     [[gnu::always_inline]] void write(const HitBatch& hits, std::size_t i, float) const { hits.count[i] = count; }
 };
 
@@ -37,6 +43,12 @@ struct AllHits {
             found->add({ray, t * scale, u, v, static_cast<std::int32_t>(prim)});
             ++count;
         }
+        return false;
+    }
+    static constexpr bool wants_uv = true;
+    [[gnu::always_inline]] bool take(float t, float u, float v, std::uint32_t prim) {
+        found->add({ray, t, u, v, static_cast<std::int32_t>(prim)});
+        ++count;
         return false;
     }
     [[gnu::always_inline]] void write(const HitBatch& hits, std::size_t i, float) const { hits.count[i] = count; }

@@ -19,6 +19,8 @@ struct AvxDouble4 {
     WIVE_INLINE friend AvxDouble4 operator*(AvxDouble4 a, AvxDouble4 b) { return {_mm256_mul_pd(a.v, b.v)}; }
     WIVE_INLINE friend AvxDouble4 operator/(AvxDouble4 a, AvxDouble4 b) { return {_mm256_div_pd(a.v, b.v)}; }
     WIVE_INLINE friend AvxDouble4 min(AvxDouble4 a, AvxDouble4 b) { return {_mm256_min_pd(a.v, b.v)}; }
+    WIVE_INLINE friend AvxDouble4 max(AvxDouble4 a, AvxDouble4 b) { return {_mm256_max_pd(a.v, b.v)}; }
+    WIVE_INLINE friend AvxDouble4 abs(AvxDouble4 a) { return {_mm256_andnot_pd(_mm256_set1_pd(-0.0), a.v)}; }
     WIVE_INLINE friend AvxDouble4 flip_sign(AvxDouble4 a, AvxDouble4 s) {
         return {_mm256_xor_pd(a.v, _mm256_and_pd(_mm256_set1_pd(-0.0), s.v))};
     }

@@ -105,9 +105,9 @@ template <class Query, class Isa>
 }
 
 template <class Isa, template <class> class Slabs, template <class> class Triangles, class Query, class Counters>
-[[gnu::noinline]] void traverse(const BvhView& bvh, const RayFrame<Isa>& ray, Query& result, Counters& counters) {
+[[gnu::noinline]] void traverse(const BvhView& bvh, const typename Triangles<Isa>::Frame& ray, Query& result,
+                                Counters& counters) {
     const Slabs<Isa> slabs(ray);
-    const typename Triangles<Isa>::PerRay per_ray(ray);
     Query query = result;
     Stack stack;
     Stack::Top top(stack);
@@ -130,7 +130,7 @@ template <class Isa, template <class> class Slabs, template <class> class Triang
         if (child == end_of_stack) break;
         counters.leaf();
         // Made here, not before the loop: registers are for what nodes need.
-        const Triangles<Isa> triangles(ray, per_ray);
+        const Triangles<Isa> triangles(ray);
         if (test_leaf(bvh.leaf(child), leaf_block_count(child), triangles, query, counters)) break;
         take_next();
         skip_hidden();
@@ -143,7 +143,7 @@ template <class Isa, template <class> class Slabs, template <class> class Triang
 void trace_one_by_one(const BvhView& bvh, const RayBatch& rays, const HitBatch& hits, const RaySource& source) {
     for (std::size_t begin, end; source.take(begin, end);)
         for (std::size_t i = begin; i < end; ++i) {
-            RayFrame<Isa> ray;
+            typename Triangles<Isa>::Frame ray;
             Query query{0, 0};
             Counters counters;
             ray.scale = 1;

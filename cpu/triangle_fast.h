@@ -11,13 +11,9 @@ class FastTriangles {
     using Float4 = typename Isa::Float4;
 
 public:
-    // What leaves need of a ray beyond its frame: nothing.
-    struct PerRay {
-        PerRay() = default;
-        [[gnu::always_inline]] explicit PerRay(const RayFrame<Isa>&) {}
-    };
+    using Frame = RayFrame<Isa>;
 
-    [[gnu::always_inline]] FastTriangles(const RayFrame<Isa>& ray, const PerRay&) {
+    [[gnu::always_inline]] explicit FastTriangles(const RayFrame<Isa>& ray) {
         for (int axis = 0; axis < 3; ++axis) {
             origin_[axis] = Float4::all(ray.origin[axis]);
             direction_[axis] = Float4::all(ray.direction[axis]);

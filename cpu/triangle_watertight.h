@@ -14,30 +14,29 @@
 
 namespace wive {
 
+// What the test needs of a ray besides: the shear that makes it the z axis.
+template <class Isa>
+struct WatertightFrame : AxisFrame<Isa> {
+    float shear[2];
+
+    [[gnu::always_inline]] bool load(const BvhView& bvh, const RayBatch& rays, std::size_t i) {
+        if (!AxisFrame<Isa>::load(bvh, rays, i)) [[unlikely]] return false;
+        for (int k = 0; k < 2; ++k) shear[k] = this->direction[this->axis[k]] / this->direction[this->axis[2]];
+        return true;
+    }
+};
+
 template <class Isa>
 class WatertightTriangles {
     using Float4 = typename Isa::Float4;
     using Double4 = typename Isa::Double4;
 
 public:
-    // What leaves need of a ray beyond its frame: its axes, the longest last, and the shear that makes it the z axis.
-    struct PerRay {
-        std::uint32_t axis[3];
-        float shear[2];
+    using Frame = WatertightFrame<Isa>;
 
-        PerRay() = default;
-        [[gnu::always_inline]] explicit PerRay(const RayFrame<Isa>& ray) {
-            constexpr unsigned following = 0b001001;  // the axis after axis i, two bits each
-            axis[2] = ray.longest_axis;
-            axis[0] = following >> 2 * axis[2] & 3u;
-            axis[1] = following >> 2 * axis[0] & 3u;
-            for (int k = 0; k < 2; ++k) shear[k] = ray.direction[axis[k]] / ray.direction[axis[2]];
-        }
-    };
-
-    [[gnu::always_inline]] WatertightTriangles(const RayFrame<Isa>& ray, const PerRay& per_ray) : ray_(ray) {
-        for (int k = 0; k < 3; ++k) axis_[k] = per_ray.axis[k];
-        for (int k = 0; k < 2; ++k) shear_[k] = per_ray.shear[k];
+    [[gnu::always_inline]] explicit WatertightTriangles(const Frame& ray) : ray_(ray) {
+        for (int k = 0; k < 3; ++k) axis_[k] = ray.axis[k];
+        for (int k = 0; k < 2; ++k) shear_[k] = ray.shear[k];
         for (int k = 0; k < 3; ++k) origin_[k] = Float4::all(ray.origin[axis_[k]]);
     }
 
@@ -156,7 +155,7 @@ private:
         }
     }
 
-    const RayFrame<Isa>& ray_;
+    const Frame& ray_;
     std::size_t axis_[3];  // the direction's longest axis last
     float shear_[2];
     Float4 origin_[3];

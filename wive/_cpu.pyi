@@ -24,7 +24,7 @@ class Bvh:
         self,
         vertices: NDArray[np.float32],
         faces: NDArray[np.int32],
-        accuracy: Literal["fast", "watertight"] = "watertight",
+        accuracy: Literal["fast", "watertight", "exact"] = "watertight",
         order: Literal["treelet", "diagonal", "none"] = "treelet",
         threads: int = 0,
         depth_limit: int = 64,
@@ -39,7 +39,7 @@ class Bvh:
         """(m,8,8) read-only view, rows lo.x hi.x lo.y hi.y lo.z hi.z child order; planes are float32 bits."""
     @property
     def blocks(self) -> NDArray[np.uint32]:
-        """(b,10,4) read-only view: nine float32 rows (fast: v0 e1 e2; watertight: v0 v1 v2), the prim row."""
+        """(b,10,4) read-only view: nine float32 rows (fast: v0 e1 e2; else: v0 v1 v2), the prim row."""
     @property
     def units(self) -> NDArray[np.uint32]:
         """(8 m + 5 b, 8) read-only view of all of it: nodes, then blocks, in units of 32 bytes.

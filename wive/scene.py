@@ -37,7 +37,7 @@ class Scene(CrossingQueries):
         *,
         backend: str = "auto",
         device: str | None = None,
-        accuracy: Literal["fast", "watertight"] = "watertight",
+        accuracy: Literal["fast", "watertight", "exact"] = "watertight",
         nodes: Literal["float32"] = "float32",
     ) -> None:
         """Build the tree.
@@ -49,7 +49,8 @@ class Scene(CrossingQueries):
             backend: "auto" (the fastest CPU backend this machine has) or a name in `wive.backends()`.
             device: where backend "warp" traces, by Warp's names: "cpu", "cuda:0", ...; None is the first CUDA
                 device, else "cpu". A device alone implies backend "warp"; CPU backends take none.
-            accuracy: "watertight" (rays never slip between triangles that share an edge or vertex) or "fast".
+            accuracy: "watertight" (rays never slip between triangles that share an edge or vertex), "fast", or
+                "exact" (hits, their order, t and uv are those of exact arithmetic, rounded once).
             nodes: "float32".
 
         C-contiguous float32 vertices and int32 faces are kept, not copied: don't change them afterwards.
@@ -57,7 +58,7 @@ class Scene(CrossingQueries):
         Raises ValueError or TypeError, in one line naming the argument, and the index of a vertex that is NaN
         or infinite or of a face out of range.
         """
-        arguments.choice("accuracy", accuracy, ("fast", "watertight"))
+        arguments.choice("accuracy", accuracy, ("fast", "watertight", "exact"))
         arguments.choice("nodes", nodes, ("float32",))
         self._options = Options(backend=backend, device=device, accuracy=accuracy, nodes=nodes)
         self._backend, self._device = resolve_backend(backend, device)
@@ -243,7 +244,7 @@ class Scene(CrossingQueries):
 
     @property
     def accuracy(self) -> str:
-        """ "watertight" or "fast"."""
+        """ "watertight", "fast" or "exact"."""
         return self._bvh.accuracy
 
     def __len__(self) -> int:

@@ -18,7 +18,7 @@ class Options(TypedDict):
 
     backend: str
     device: str | None
-    accuracy: Literal["fast", "watertight"]
+    accuracy: Literal["fast", "watertight", "exact"]
     nodes: Literal["float32"]
 
 

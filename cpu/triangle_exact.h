@@ -1,0 +1,170 @@
+// Exact hits on four triangles: a filter in double whose error is bounded, and integers where it leaves a doubt. The
+// constants are derived in docs/accuracy.md; e = 2^-53.
+#pragma once
+
+#include <cmath>
+
+#include "exact_hit.h"
+#include "frame.h"
+#include "layout.h"
+
+namespace wive {
+
+// What the exact test needs of a ray besides: the caller's own numbers, because scaling a direction whose components
+// differ by more than float's range is not exact, and t has to be rounded in the caller's units.
+template <class Isa>
+struct ExactFrame : AxisFrame<Isa> {
+    float given_direction[3];
+    float given_tmin, given_tmax;
+    float unscale;     // t here = unscale * t of the caller's ray
+    double from[3];    // the origin, in the order of the axes, as the next two are
+    double shear[2];   // the direction over that on the longest axis
+    double inverse;    // 1 / the direction on the longest axis
+    double bound;      // no weight in the whole tree is off by more
+
+    [[gnu::always_inline]] bool load(const BvhView& bvh, const RayBatch& rays, std::size_t i) {
+        if (!AxisFrame<Isa>::load(bvh, rays, i)) [[unlikely]] return false;
+        using Float4 = typename Isa::Float4;
+        const auto& axis = this->axis;
+        const float *o = rays.origins + 3 * i, *d = rays.directions + 3 * i;
+        for (int k = 0; k < 3; ++k) {
+            given_direction[k] = d[k];
+            from[k] = o[axis[k]];
+        }
+        given_tmin = rays.tmin[i * rays.tmin_stride];
+        given_tmax = rays.tmax[i * rays.tmax_stride];
+        unscale = 1.0f / this->scale;
+        inverse = 1.0 / d[axis[2]];
+        shear[0] = slope(d[axis[0]] * inverse);
+        shear[1] = slope(d[axis[1]] * inverse);
+        // 96 e M^2, M no less than the distance of any corner from the origin along an axis.
+        const Float4 relative = Float4::load(this->origin) - Float4::load(bvh.center);
+        const double reach = highest_lane(Float4::load(bvh.extent) + abs(relative));
+        bound = 97 * 0x1p-53 * reach * reach;  // one more for reach's own rounding
+        return true;
+    }
+
+    GivenRay given() const {
+        return {{this->origin[0], this->origin[1], this->origin[2]},
+                {given_direction[0], given_direction[1], given_direction[2]}};
+    }
+
+private:
+    // Smaller slopes move nothing by as much as rounding does; without them no product underflows.
+    [[gnu::always_inline]] static double slope(double s) { return std::fabs(s) < 0x1p-100 ? 0.0 : s; }
+};
+
+template <class Isa>
+class ExactTriangles {
+    using Float4 = typename Isa::Float4;
+    using Double4 = typename Isa::Double4;
+
+public:
+    using Frame = ExactFrame<Isa>;
+
+    [[gnu::always_inline]] explicit ExactTriangles(const Frame& ray) : ray_(ray) {}
+
+    // Offers every hit of the block to the query; true once the query is done.
+    template <class Query>
+    [[gnu::always_inline]] bool test(const TriangleBlock& block, Query& query) const {
+        Double4 x[3], y[3], z[3], weight[3];
+        const Double4 shear_x = Double4::all(ray_.shear[0]), shear_y = Double4::all(ray_.shear[1]);
+        for (int k = 0; k < 3; ++k) {
+            const auto away = [&](int i) { return corners(block, k, ray_.axis[i]) - Double4::all(ray_.from[i]); };
+            z[k] = away(2);
+            x[k] = away(0) - shear_x * z[k];
+            y[k] = away(1) - shear_y * z[k];
+        }
+        for (int k = 0; k < 3; ++k) {
+            const int i = (k + 1) % 3, j = (k + 2) % 3;
+            weight[k] = x[i] * y[j] - y[i] * x[j];
+        }
+        const Double4 low = min(min(weight[0], weight[1]), weight[2]);
+        const Double4 high = max(max(weight[0], weight[1]), weight[2]);
+        const unsigned lanes = less_equal(Double4::all(-ray_.bound), low) | less_equal(high, Double4::all(ray_.bound));
+        if (lanes == 0) [[likely]] return false;
+        return solve(block, lanes, x, y, z, weight, low, high, query);
+    }
+
+private:
+    // Four corners' coordinates on an axis, and one triangle's corners: the only places that know the block's layout.
+    [[gnu::always_inline]] static Double4 corners(const TriangleBlock& block, int k, std::size_t axis) {
+        return widen(Float4::load(block.rows[3 * static_cast<std::size_t>(k) + axis]));
+    }
+    [[gnu::noinline]] static Corners corners_of(const TriangleBlock& block, int lane) {
+        Corners one;
+        for (int i = 0; i < 9; ++i) one.v[i] = block.rows[i][lane];
+        return one;
+    }
+
+    template <class Query>
+    [[gnu::always_inline]] bool solve(const TriangleBlock& block, unsigned lanes, const Double4 (&x)[3],
+                                      const Double4 (&y)[3], const Double4 (&z)[3], const Double4 (&weight)[3],
+                                      Double4 low, Double4 high, Query& query) const {
+        constexpr double e = 0x1p-53;
+        // The error of these weights: e (r + 4 e Z) (13 r + 21 Z).
+        const Double4 near = min(min(z[0], z[1]), z[2]), far = max(max(z[0], z[1]), z[2]);
+        const Double4 along = max(abs(near), abs(far));
+        Double4 aside = max(abs(x[0]), abs(y[0]));
+        for (int k = 1; k < 3; ++k) aside = max(aside, max(abs(x[k]), abs(y[k])));
+        const Double4 error = (aside + Double4::all(4 * e) * along) *
+                              (Double4::all(13 * e) * aside + Double4::all(21 * e) * along);
+        const Double4 minus_error = Double4::all(0.0) - error;
+        lanes &= less_equal(minus_error, low) | less_equal(high, error);
+        if (lanes == 0) return false;
+
+        unsigned doubt = less_equal(low, error) & less_equal(minus_error, high);
+        const Double4 share = Double4::all(1.0) / (weight[0] + weight[1] + weight[2]);
+        const Double4 depth = (weight[0] * z[0] + weight[1] * z[1] + weight[2] * z[2]) * share;
+        const Double4 weight_error = Double4::all(6.0) * error * abs(share);
+        const Double4 depth_error = weight_error * (far - near) + Double4::all(12 * e) * along;
+        alignas(16) float ts[4], us[4] = {}, vs[4] = {};
+        const Double4 inverse = Double4::all(ray_.inverse);
+        doubt |= round(depth * inverse, depth_error * abs(inverse), ts);
+        if constexpr (Query::wants_uv) {
+            doubt |= round(weight[1] * share, weight_error, us);
+            doubt |= round(weight[2] * share, weight_error, vs);
+        }
+        for (; lanes != 0; lanes &= lanes - 1) {
+            const int lane = __builtin_ctz(lanes);
+            HitNumbers hit = {ts[lane], us[lane], vs[lane]};
+            if (doubt >> lane & 1u) [[unlikely]] {
+                if (!hits_exactly(ray_.given(), corners_of(block, lane), Query::crossings, hit)) continue;
+            }
+            if (!within_limits(block, lane, hit.t)) continue;
+            if (offer(block, lane, hit, query)) return true;
+        }
+        return false;
+    }
+
+    // Rounds x to float; the lanes in which a number within the error of x rounds otherwise.
+    [[gnu::always_inline]] static unsigned round(Double4 x, Double4 error, float (&rounded)[4]) {
+        const Float4 below = Float4::narrow(x - error), above = Float4::narrow(x + error);
+        (below + Float4::all(0.0f)).store(rounded);  // no -0
+        return ~equal(below, above);
+    }
+
+    // Rounding keeps order, so only where t rounds to a limit can it have crossed it.
+    [[gnu::always_inline]] bool within_limits(const TriangleBlock& block, int lane, float t) const {
+        if (t < ray_.given_tmin || t > ray_.given_tmax) return false;
+        if (t == ray_.given_tmin) [[unlikely]]
+            if (compare_with_limit(ray_.given(), corners_of(block, lane), t) < 0) return false;
+        if (t == ray_.given_tmax) [[unlikely]]
+            if (compare_with_limit(ray_.given(), corners_of(block, lane), t) > 0) return false;
+        return true;
+    }
+
+    template <class Query>
+    [[gnu::always_inline]] bool offer(const TriangleBlock& block, int lane, const HitNumbers& hit, Query& query) const {
+        if constexpr (Query::in_order)
+            return query.take(hit, block, lane, ray_.unscale, [&](const TriangleBlock& other, int other_lane) {
+                return compare_distances(ray_.given(), corners_of(block, lane), corners_of(other, other_lane));
+            });
+        else
+            return query.take(hit.t, hit.u, hit.v, static_cast<std::uint32_t>(block.prim[lane]));
+    }
+
+    const Frame& ray_;
+};
+
+}  // namespace wive
