@@ -3,12 +3,15 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <span>
 #include <stdexcept>
 #include <utility>
 #include <vector>
 
 #include "collapse.h"
 #include "parallel.h"
+#include "write_compressed.h"
+#include "write_float32.h"
 
 namespace wive {
 
@@ -25,7 +28,26 @@ namespace {
 
 constexpr std::uint32_t parallel_subtree = 1 << 14;  // subtrees of at most so many triangles are emitted by one thread
 
+// A leaf's triangles by rising number.
+class LeafPrims {
+public:
+    LeafPrims(const BinaryTree& tree, const Slot& slot) : count_(slot.end - slot.begin) {
+        for (std::uint32_t i = 0; i < count_; ++i) prims_[i] = tree.refs[slot.begin + i].prim();
+        std::sort(prims_.begin(), prims_.begin() + count_);
+    }
+    std::span<const std::uint32_t> span() const { return {prims_.data(), count_}; }
+
+private:
+    std::array<std::uint32_t, block_width * max_leaf_blocks> prims_;
+    std::uint32_t count_;
+};
+
+// Plans where everything goes; Writer knows what the nodes and blocks there look like.
+template <class Writer>
 class Emitter {
+    using Block = typename Writer::Block;
+    using StoredNode = typename Writer::Node;
+
 public:
     Emitter(const BinaryTree& tree, const Mesh& mesh, const BuildOptions& options, const std::array<float, 3>& center)
         : tree_(tree), mesh_(mesh), options_(options), center_(center) {}
@@ -47,11 +69,11 @@ public:
             total.nodes += subtree.size.nodes;
             total.blocks += subtree.size.blocks;
         }
-        const std::size_t node_bytes = total.nodes * sizeof(Node), bytes = node_bytes + total.blocks * sizeof(TriangleBlock);
+        const std::size_t node_bytes = total.nodes * sizeof(StoredNode), bytes = node_bytes + total.blocks * sizeof(Block);
         if (bytes / unit_bytes > max_units) throw std::invalid_argument("faces: too many triangles for one scene");
         LargeArray<std::byte> units(bytes);
-        nodes_ = reinterpret_cast<Node*>(units.data());
-        blocks_ = reinterpret_cast<TriangleBlock*>(units.data() + node_bytes);
+        nodes_ = reinterpret_cast<StoredNode*>(units.data());
+        blocks_ = reinterpret_cast<Block*>(units.data() + node_bytes);
         first_block_unit_ = node_bytes / unit_bytes;
         Size cursor = {1, 0};
         std::size_t next_subtree = 0;
@@ -78,9 +100,9 @@ private:
     };
     using Children = std::array<std::uint32_t, node_width>;
 
-    static std::uint32_t node_child(std::size_t node) { return inner_child(node * (sizeof(Node) / unit_bytes)); }
+    static std::uint32_t node_child(std::size_t node) { return inner_child(node * (sizeof(StoredNode) / unit_bytes)); }
     std::uint32_t block_child(std::size_t first, std::size_t count) const {
-        return leaf_child(first_block_unit_ + first * (sizeof(TriangleBlock) / unit_bytes),
+        return leaf_child(first_block_unit_ + first * (sizeof(Block) / unit_bytes),
                           static_cast<std::uint32_t>(count));
     }
 
@@ -99,7 +121,7 @@ private:
 
     // Nodes and blocks below a slot, without the slot's own node.
     Size measure(const Slot& slot) const {
-        if (slot.leaf) return {0, blocks_for(slot.end - slot.begin)};
+        if (slot.leaf) return {0, Writer::count_blocks(mesh_, LeafPrims(tree_, slot).span())};
         const Treelet treelet = gather_treelet(tree_, slot.split);
         Size size;
         for (int i = 0; i < treelet.count; ++i) {
@@ -167,7 +189,8 @@ private:
         return box;
     }
 
-    void write_node(Node& node, const Treelet& treelet, const Children& children) const {
+    void write_node(StoredNode& out, const Treelet& treelet, const Children& children) const {
+        Node node;
         for (int i = 0; i < node_width; ++i) {
             const bool used = i < treelet.count;
             const Box box = used ? box_of(treelet.slots[static_cast<std::size_t>(i)]) : Box{};
@@ -182,38 +205,14 @@ private:
                                     : options_.order == ChildOrder::diagonal ? sort_along_diagonals(node, treelet.count)
                                                                              : shuffle(node, treelet.count);
         write_order(node, order, treelet.count);
+        Writer::write_node(node, treelet.count, out);
     }
 
     std::uint32_t write_leaf(const Slot& slot, Size& cursor) const {
+        const LeafPrims prims(tree_, slot);
         const std::size_t first = cursor.blocks;
-        std::array<std::uint32_t, block_width * max_leaf_blocks> prims;
-        const std::uint32_t count = slot.end - slot.begin;
-        for (std::uint32_t i = 0; i < count; ++i) prims[i] = tree_.refs[slot.begin + i].prim();
-        std::sort(prims.begin(), prims.begin() + count);
-        for (std::uint32_t i = 0; i < count; i += block_width) {
-            TriangleBlock& block = blocks_[cursor.blocks++];
-            if (count - i < block_width) clear_block(block);
-            for (std::uint32_t k = 0; k < std::min<std::uint32_t>(block_width, count - i); ++k)
-                write_triangle(block, k, prims[i + k]);
-        }
+        cursor.blocks += Writer::write_blocks(mesh_, options_.accuracy, prims.span(), blocks_ + first);
         return block_child(first, cursor.blocks - first);
-    }
-
-    static void clear_block(TriangleBlock& block) {
-        for (auto& row : block.rows)
-            for (float& value : row) value = std::numeric_limits<float>::quiet_NaN();
-        for (std::int32_t& prim : block.prim) prim = -1;
-    }
-
-    void write_triangle(TriangleBlock& block, std::uint32_t lane, std::uint32_t prim) const {
-        for (int k = 0; k < 3; ++k) {
-            const float* corner = mesh_.corner(prim, k);
-            const float* first = mesh_.corner(prim, 0);
-            const bool edge = options_.accuracy == Accuracy::fast && k > 0;
-            for (int axis = 0; axis < 3; ++axis)
-                block.rows[3 * k + axis][lane] = edge ? corner[axis] - first[axis] : corner[axis];
-        }
-        block.prim[lane] = static_cast<std::int32_t>(prim);
     }
 
     // Larger than any plane with its slack, small enough that no arithmetic on it overflows.
@@ -223,8 +222,8 @@ private:
     const Mesh& mesh_;
     const BuildOptions& options_;
     const std::array<float, 3>& center_;
-    Node* nodes_ = nullptr;
-    TriangleBlock* blocks_ = nullptr;
+    StoredNode* nodes_ = nullptr;
+    Block* blocks_ = nullptr;
     std::size_t first_block_unit_ = 0;
 };
 
@@ -232,7 +231,9 @@ private:
 
 EmittedTree emit_tree(const BinaryTree& tree, const Mesh& mesh, const BuildOptions& options,
                       const std::array<float, 3>& center, unsigned threads) {
-    return Emitter(tree, mesh, options, center).emit(threads);
+    if (options.nodes == NodeForm::compressed)
+        return Emitter<CompressedWriter>(tree, mesh, options, center).emit(threads);
+    return Emitter<Float32Writer>(tree, mesh, options, center).emit(threads);
 }
 
 }  // namespace wive

@@ -37,7 +37,7 @@ struct RayFrame {
     alignas(16) float far_bias[4];
     float tmin, tmax;
     float scale;  // t of the caller's ray = scale * t here
-    std::uint32_t near_row[3];  // bytes from a node to the planes that the ray meets first; its far row is the other one
+    std::uint32_t near_row[3];  // in planes from a node's first one: the row that the ray meets first; its far row is the other one
     unsigned octant;  // bit a: negative on axis a, from the sign of the reciprocal
     unsigned longest_axis;
 
@@ -72,7 +72,7 @@ struct RayFrame {
         const Float4 distance = relative * reciprocal, slack = size * Float4::all(reach * slack_factor);
         octant = sign_bits(scaled) & 7u;
         longest_axis = static_cast<unsigned>(std::countr_zero(less_equal(Float4::all(longest), lengths)));
-        for (unsigned axis = 0; axis < 3; ++axis) near_row[axis] = row_bytes * (2 * axis + (octant >> axis & 1u));
+        for (unsigned axis = 0; axis < 3; ++axis) near_row[axis] = node_width * (2 * axis + (octant >> axis & 1u));
         caller_origin.store(origin);
         scaled.store(direction);
         reciprocal.store(rdir);

@@ -38,6 +38,8 @@ template <class Isa, template <class> class Slabs, template <class> class Triang
 class InFlight {
 public:
     using State = Flight<Isa, Query, Counters>;
+    using Form = typename Slabs<Isa>::Form;
+    using Corners = typename Form::template Corners<Isa>;
 
     [[gnu::always_inline]] InFlight(const BvhView& bvh, const RayBatch& rays, const HitBatch& hits,
                                     const RaySource& source, std::byte* scratch)
@@ -80,7 +82,7 @@ private:
         if constexpr (Query::in_order)
             while (f.top.distance() > f.query.tmax) f.top.move(-1);
         const std::uint32_t child = f.top.child();
-        prefetch(bvh_, child);
+        prefetch<Form>(bvh_, child);
         const bool inner = is_inner(child), end = child == end_of_stack;
         at_node_.add_if(inner, &f);
         at_leaf_.add_if(!inner & !end, &f);
@@ -93,7 +95,7 @@ private:
         for (unsigned i = 0; i < count; ++i) {
             State& f = *at_node_.flights[i];
             f.counters.inner_node();
-            visit<Query::in_order>(bvh_.node(f.top.child()), Slabs<Isa>(f.ray), f.query.tmax, f.top);
+            visit<Query::in_order>(bvh_.template node<Form>(f.top.child()), Slabs<Isa>(f.ray), f.query.tmax, f.top);
             wait(f);
         }
     }
@@ -105,8 +107,9 @@ private:
             State& f = *at_leaf_.flights[i];
             const std::uint32_t child = f.top.child();
             f.counters.leaf();
+            const auto* blocks = bvh_.template leaf<Form>(child);
             const bool finished =
-                test_leaf(bvh_.leaf(child), leaf_block_count(child), Triangles<Isa>(f.ray), f.query, f.counters);
+                test_leaf<Corners>(blocks, leaf_block_count(child), Triangles<Isa>(f.ray), f.query, f.counters);
             if (finished) f.top = Stack::Top(f.stack);
             f.top.move(-1);
             wait(f);

@@ -12,18 +12,32 @@
 
 namespace wive {
 
-template <class Isa, template <class> class Slabs>
+// The slab test of nodes that a table has no kernels for.
+template <class>
+struct NoSlabs;
+
+template <class Isa, template <class> class ForFloat32, template <class> class ForCompressed>
 struct KernelMaker {
     template <QueryKind kind>
     using Query = std::conditional_t<kind == QueryKind::closest, ClosestHit, AnyHit>;
 
-    template <KernelChoice choice>
-    static constexpr TraceBatch kernel() {
+    template <KernelChoice choice, template <class> class Slabs>
+    static constexpr TraceBatch kernel_with() {
         using Counters = std::conditional_t<choice.counting, StepCounters, NoCounters>;
-        if constexpr (choice.accuracy == Accuracy::fast)
+        if constexpr (std::is_same_v<Slabs<Isa>, NoSlabs<Isa>>)
+            return nullptr;
+        else if constexpr (choice.accuracy == Accuracy::fast)
             return trace_batch<Isa, Slabs, FastTriangles, Query<choice.query>, Counters>;
         else
             return trace_batch<Isa, Slabs, WatertightTriangles, Query<choice.query>, Counters>;
+    }
+
+    template <KernelChoice choice>
+    static constexpr TraceBatch kernel() {
+        if constexpr (choice.nodes == NodeForm::float32)
+            return kernel_with<choice, ForFloat32>();
+        else
+            return kernel_with<choice, ForCompressed>();
     }
 
     template <std::size_t... index>
@@ -34,9 +48,9 @@ struct KernelMaker {
     }
 };
 
-template <class Isa, template <class> class Slabs>
+template <class Isa, template <class> class ForFloat32, template <class> class ForCompressed = NoSlabs>
 constexpr KernelTable make_kernel_table(std::string_view name) {
-    return KernelMaker<Isa, Slabs>::table(name, std::make_index_sequence<kernel_count>());
+    return KernelMaker<Isa, ForFloat32, ForCompressed>::table(name, std::make_index_sequence<kernel_count>());
 }
 
 }  // namespace wive

@@ -1,7 +1,7 @@
 // WiVe: single-ray traversal of the 8-wide tree, the same steps for every node whatever it holds.
 //
 // Fuetterling, Lojewski, Pfreundt, Hamann, Ebert: "Accelerated Single Ray Tracing for Wide Vector Units", HPG 2017.
-// Isa picks the instruction set, Slabs the form (full or half), Triangles the accuracy, Query what is asked,
+// Isa picks the instruction set, Slabs the form of the slab test and of the nodes, Triangles the accuracy, Query what is asked,
 // Counters whether steps are counted. A kernel holds only the code of what it was made for.
 #pragma once
 
@@ -16,7 +16,7 @@ namespace wive {
 struct NoCounters {
     [[gnu::always_inline]] void inner_node() {}
     [[gnu::always_inline]] void leaf() {}
-    [[gnu::always_inline]] void block(const TriangleBlock&) {}
+    [[gnu::always_inline]] void block(const auto&) {}
     [[gnu::always_inline]] void write(const HitBatch&, std::size_t) const {}
 };
 
@@ -25,7 +25,7 @@ struct StepCounters {
 
     [[gnu::always_inline]] void inner_node() { ++inner_nodes; }
     [[gnu::always_inline]] void leaf() { ++leaves; }
-    [[gnu::always_inline]] void block(const TriangleBlock& block) {
+    [[gnu::always_inline]] void block(const auto& block) {
         for (const std::int32_t prim : block.prim) triangles += prim >= 0;
     }
     [[gnu::always_inline]] void write(const HitBatch& hits, std::size_t i) const {
@@ -35,20 +35,22 @@ struct StepCounters {
     }
 };
 
-// Starts loading four cache lines of what a child reference points to: a whole node, or one block and more. The
+// Starts loading the first cache lines of what a child reference points to: a whole node, or one block and more. The
 // address is an integer, because end_of_stack points nowhere; a prefetch of such an address does nothing.
+template <class Form>
 [[gnu::always_inline]] inline void prefetch(const BvhView& bvh, std::uint32_t child) {
     const std::uintptr_t address = reinterpret_cast<std::uintptr_t>(bvh.units) + child_offset(child);
-    for (unsigned line = 0; line < 4; ++line) __builtin_prefetch(reinterpret_cast<const void*>(address + 64 * line));
+    for (unsigned line = 0; line < Form::prefetched_lines; ++line)
+        __builtin_prefetch(reinterpret_cast<const void*>(address + 64 * line));
 }
 
 // Offers the triangles of a leaf to the query; true once the query is done.
-template <class Triangles, class Query, class Counters>
-[[gnu::always_inline]] inline bool test_leaf(const TriangleBlock* block, std::uint32_t count, const Triangles& triangles,
-                                             Query& query, Counters& counters) {
+template <class Corners, class Triangles, class Query, class Counters>
+[[gnu::always_inline]] inline bool test_leaf(const typename Corners::Block* block, std::uint32_t count,
+                                             const Triangles& triangles, Query& query, Counters& counters) {
     for (std::uint32_t i = 0; i < count; ++i) {
         counters.block(block[i]);
-        if (triangles.test(block[i], query)) return true;
+        if (triangles.test(Corners(block[i]), query)) return true;
     }
     return false;
 }
@@ -56,10 +58,10 @@ template <class Triangles, class Query, class Counters>
 // Visits an inner node: the children that the ray meets go onto the stack, and top moves to the last of them, the
 // nearest; or to the entry below, where none was met. No branch: the same steps for no hit and for eight.
 template <bool in_order, class Isa, template <class> class Slabs>
-[[gnu::always_inline]] inline void visit(const Node& node, const Slabs<Isa>& slabs, float tmax, Stack::Top& top) {
+[[gnu::always_inline]] inline void visit(const typename Slabs<Isa>::Form::Node& node, const Slabs<Isa>& slabs, float tmax,
+                                         Stack::Top& top) {
     const auto order = slabs.order(node);                                                     // (A) order
-    const auto [tnear, tfar] = slabs.test(node, tmax);                                        // (B) slabs
-    const auto hit = hits(tnear, tfar);
+    const auto [tnear, hit] = slabs.test(node, tmax);                                         // (B) slabs
     const typename Isa::template Lanes<in_order> lanes(order, hit, tnear, node.child);        // (C) permute,
     lanes.compress_to(top);                                                                   //     compress,
     top.move(static_cast<std::ptrdiff_t>(hit.count()) - 1);                                   // (D) store
@@ -70,11 +72,10 @@ template <bool in_order, class Isa, template <class> class Slabs>
 // Predicted, it lets the processor go on with what lies below on the stack while this node's boxes are still being
 // decided: 40 cycles a node without it, 26 with it, where rays are alike (docs/design.md).
 template <bool in_order, class Isa, template <class> class Slabs>
-[[gnu::always_inline]] inline std::uint32_t visit_and_take(const Node& node, const Slabs<Isa>& slabs, float tmax,
-                                                           Stack::Top& top) {
+[[gnu::always_inline]] inline std::uint32_t visit_and_take(const typename Slabs<Isa>::Form::Node& node,
+                                                           const Slabs<Isa>& slabs, float tmax, Stack::Top& top) {
     const auto order = slabs.order(node);
-    const auto [tnear, tfar] = slabs.test(node, tmax);
-    const auto hit = hits(tnear, tfar);
+    const auto [tnear, hit] = slabs.test(node, tmax);
     const unsigned count = hit.count();
     if (count == 0) {
         top.move(-1);
@@ -88,6 +89,8 @@ template <bool in_order, class Isa, template <class> class Slabs>
 
 template <class Isa, template <class> class Slabs, template <class> class Triangles, class Query, class Counters>
 [[gnu::noinline]] void traverse(const BvhView& bvh, const RayFrame<Isa>& ray, Query& result, Counters& counters) {
+    using Form = typename Slabs<Isa>::Form;
+    using Corners = typename Form::template Corners<Isa>;
     const Slabs<Isa> slabs(ray);
     const Triangles<Isa> triangles(ray);
     Query query{ray.tmin, ray.tmax};
@@ -106,13 +109,14 @@ template <class Isa, template <class> class Slabs, template <class> class Triang
     for (;;) {
         while (is_inner(child)) {
             counters.inner_node();
-            child = visit_and_take<Query::in_order>(bvh.node(child), slabs, query.tmax, top);
-            prefetch(bvh, top.child(-1));  // the one after next; the next is needed at once anyway
+            child = visit_and_take<Query::in_order>(bvh.template node<Form>(child), slabs, query.tmax, top);
+            prefetch<Form>(bvh, top.child(-1));  // the one after next; the next is needed at once anyway
             skip_hidden();
         }
         if (child == end_of_stack) break;
         counters.leaf();
-        if (test_leaf(bvh.leaf(child), leaf_block_count(child), triangles, query, counters)) break;
+        const auto* blocks = bvh.template leaf<Form>(child);
+        if (test_leaf<Corners>(blocks, leaf_block_count(child), triangles, query, counters)) break;
         take_next();
         skip_hidden();
     }
