@@ -217,7 +217,8 @@ PYBIND11_MODULE(_cpu, m, py::mod_gil_not_used()) {
         })
         .def_property_readonly("blocks", [](py::object self) {
             const Bvh& bvh = self.cast<const PyBvh&>().bvh();
-            return rows(self, bvh.blocks(), bvh.block_bytes(), 4);
+            if (bvh.node_form() == NodeForm::compressed) return rows(self, bvh.blocks(), unit_bytes, 8);
+            return rows(self, bvh.blocks(), sizeof(TriangleBlock), 4);
         })
         .def_property_readonly("units", [](py::object self) {
             const Bvh& bvh = self.cast<const PyBvh&>().bvh();

@@ -48,7 +48,6 @@ Bvh::Bvh(const Mesh& mesh, const BuildOptions& options) : accuracy_(options.accu
     EmittedTree emitted = emit_tree(tree, mesh, options, center_, threads);
     units_ = std::move(emitted.units);
     node_count_ = emitted.node_count;
-    block_count_ = emitted.block_count;
     depth_ = emitted.depth;
 }
 

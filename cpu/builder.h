@@ -28,10 +28,10 @@ public:
 
     BvhView view() const;
     std::size_t bytes() const { return units_.size(); }
+    // As they are stored; float32 blocks have one size, compressed ones two.
     std::span<const std::byte> nodes() const { return {units_.data(), node_count_ * node_bytes()}; }
-    std::span<const std::byte> blocks() const { return {units_.data() + nodes().size(), block_count_ * block_bytes()}; }
+    std::span<const std::byte> blocks() const { return {units_.data() + nodes().size(), bytes() - nodes().size()}; }
     std::size_t node_bytes() const { return form_ == NodeForm::float32 ? sizeof(Node) : sizeof(CompressedNode); }
-    std::size_t block_bytes() const { return form_ == NodeForm::float32 ? sizeof(TriangleBlock) : sizeof(CompressedBlock); }
     Accuracy accuracy() const { return accuracy_; }
     NodeForm node_form() const { return form_; }
     int depth() const { return depth_; }
@@ -48,7 +48,7 @@ private:
     Sah sah_of(double root) const;
 
     LargeArray<std::byte> units_;
-    std::size_t node_count_ = 0, block_count_ = 0;
+    std::size_t node_count_ = 0;
     Accuracy accuracy_;
     NodeForm form_;
     int depth_ = 0;

@@ -1,6 +1,7 @@
-// The compressed tree: half the bytes of a node, three fifths of a block's, and the same hits bit for bit.
+// The compressed tree: half the bytes of a node, three fifths of most blocks', and the same hits bit for bit.
 #pragma once
 
+#include <bit>
 #include <cstddef>
 #include <cstdint>
 
@@ -25,21 +26,28 @@ struct alignas(64) CompressedNode {
 };
 static_assert(sizeof(CompressedNode) == 128 && offsetof(CompressedNode, child) == 96);
 
-// Four triangles over at most six vertices, each stored once; neighbours share them, and a leaf that does not get by
-// with six takes two blocks. Rows are x, y, z. corners holds the number of each corner's vertex, four bits each, lane by
-// lane: first vertices in the low half of word 0, second in its high half, third in the low half of word 1. Bits 16
-// to 19 of word 1 say which lanes are used; the others hold prim -1.
-inline constexpr int block_vertices = 6;
+// Up to four triangles over six or eight vertices, each stored once: neighbours share them, and a leaf that does not
+// get by with eight takes two blocks. What follows the header: rows x, y, z of the vertices, then a prim a lane, in 96 or
+// 128 bytes. corners holds the number of each corner's vertex, four bits each, lane by lane: first vertices in the low half
+// of word 0, second in its high half, third in the low half of word 1. Above these, word 1 has a bit for each lane
+// that is used (the others hold prim -1), and then the number of vertices. One may read eight floats from any row on.
 struct alignas(32) CompressedBlock {
-    float rows[3][block_vertices];
-    std::int32_t prim[block_width];
+    static constexpr int few_vertices = 6, most_vertices = 8;
+
     std::uint32_t corners[2];
 
-    unsigned used() const { return corners[1] >> 16; }
+    std::uint32_t vertices() const { return corners[1] >> 20; }
+    unsigned used() const { return corners[1] >> 16 & 15u; }
     int corner(int k, int lane) const { return static_cast<int>(corners[k >> 1] >> (16 * (k & 1) + 4 * lane) & 7u); }
-    float vertex(int k, int axis, int lane) const { return rows[axis][corner(k, lane)]; }
+
+    const float* row(std::size_t axis) const { return reinterpret_cast<const float*>(this) + 2 + vertices() * axis; }
+    float vertex(int k, int axis, int lane) const { return row(static_cast<std::size_t>(axis))[corner(k, lane)]; }
+    std::int32_t prim_at(int lane) const { return std::bit_cast<std::int32_t>(row(3)[lane]); }
+
+    static constexpr std::size_t units(std::size_t vertices) { return vertices / 2; }
+    const CompressedBlock* next() const { return this + units(vertices()); }
 };
-static_assert(sizeof(CompressedBlock) == 96);
+static_assert(sizeof(CompressedBlock) == unit_bytes);
 
 // A leaf holds at most so many triangles, because any two fit into one block.
 inline constexpr int max_compressed_leaf = 2 * max_leaf_blocks;

@@ -5,7 +5,7 @@
 
 namespace wive {
 
-// Two cache lines hold a node, and one block wherever it begins.
+// Two cache lines hold a node, and most blocks wherever they begin.
 struct CompressedForm {
     using Node = CompressedNode;
     using Block = CompressedBlock;

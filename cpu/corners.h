@@ -35,7 +35,7 @@ struct SharedCorners {
     [[gnu::always_inline]] explicit SharedCorners(const Block& of)
         : block(of), pick{{of.corners[0], 0}, {of.corners[0], 16}, {of.corners[1], 0}} {}
     [[gnu::always_inline]] Float4 vertex(std::size_t k, std::size_t axis) const {
-        return pick[k](reinterpret_cast<const float*>(&block) + block_vertices * axis);
+        return pick[k](block.row(axis));
     }
     [[gnu::always_inline]] Float4 edge(std::size_t k, std::size_t axis, Float4 v0) const { return vertex(k, axis) - v0; }
     [[gnu::always_inline]] unsigned used(unsigned lanes) const { return lanes & block.used(); }

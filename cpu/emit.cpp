@@ -45,7 +45,6 @@ private:
 // Plans where everything goes; Writer knows what the nodes and blocks there look like.
 template <class Writer>
 class Emitter {
-    using Block = typename Writer::Block;
     using StoredNode = typename Writer::Node;
 
 public:
@@ -53,7 +52,7 @@ public:
         : tree_(tree), mesh_(mesh), options_(options), center_(center) {}
 
     struct Size {
-        std::size_t nodes = 0, blocks = 0;
+        std::size_t nodes = 0, leaf_units = 0;
     };
 
     EmittedTree emit(unsigned threads) {
@@ -67,27 +66,25 @@ public:
         for (Subtree& subtree : subtrees) {
             subtree.first = total;
             total.nodes += subtree.size.nodes;
-            total.blocks += subtree.size.blocks;
+            total.leaf_units += subtree.size.leaf_units;
         }
-        const std::size_t node_bytes = total.nodes * sizeof(StoredNode), bytes = node_bytes + total.blocks * sizeof(Block);
+        const std::size_t node_bytes = total.nodes * sizeof(StoredNode);
+        const std::size_t bytes = node_bytes + total.leaf_units * unit_bytes;
         if (bytes / unit_bytes > max_units) throw std::invalid_argument("faces: too many triangles for one scene");
         LargeArray<std::byte> units(bytes);
         nodes_ = reinterpret_cast<StoredNode*>(units.data());
-        blocks_ = reinterpret_cast<Block*>(units.data() + node_bytes);
-        first_block_unit_ = node_bytes / unit_bytes;
+        leaves_ = units.data() + node_bytes;
+        first_leaf_unit_ = node_bytes / unit_bytes;
         Size cursor = {1, 0};
         std::size_t next_subtree = 0;
         int depth = emit_top(root, 0, cursor, subtrees, next_subtree);
         std::vector<int> depths(subtrees.size());
         parallel_for(subtrees.size(), threads, [&](std::size_t i) {
             Size at = subtrees[i].first;
-            if (subtrees[i].slot.leaf)
-                write_leaf(subtrees[i].slot, at);
-            else
-                depths[i] = emit_subtree(subtrees[i].slot, subtrees[i].node, at);
+            if (!subtrees[i].slot.leaf) depths[i] = emit_subtree(subtrees[i].slot, subtrees[i].node, at);
         });
         for (std::size_t i = 0; i < subtrees.size(); ++i) depth = std::max(depth, subtrees[i].depth + depths[i]);
-        return {std::move(units), total.nodes, total.blocks, depth};
+        return {std::move(units), total.nodes, depth};
     }
 
 private:
@@ -101,10 +98,6 @@ private:
     using Children = std::array<std::uint32_t, node_width>;
 
     static std::uint32_t node_child(std::size_t node) { return inner_child(node * (sizeof(StoredNode) / unit_bytes)); }
-    std::uint32_t block_child(std::size_t first, std::size_t count) const {
-        return leaf_child(first_block_unit_ + first * (sizeof(Block) / unit_bytes),
-                          static_cast<std::uint32_t>(count));
-    }
 
     static bool is_top(const Slot& slot) { return !slot.leaf && slot.end - slot.begin > parallel_subtree; }
 
@@ -119,16 +112,16 @@ private:
         }
     }
 
-    // Nodes and blocks below a slot, without the slot's own node.
+    // Nodes and units of blocks below a slot, without the slot's own node.
     Size measure(const Slot& slot) const {
-        if (slot.leaf) return {0, Writer::count_blocks(mesh_, LeafPrims(tree_, slot).span())};
+        if (slot.leaf) return {0, Writer::leaf_size(mesh_, LeafPrims(tree_, slot).span()).units};
         const Treelet treelet = gather_treelet(tree_, slot.split);
         Size size;
         for (int i = 0; i < treelet.count; ++i) {
             const Slot& child = treelet.slots[static_cast<std::size_t>(i)];
             const Size below = measure(child);
             size.nodes += below.nodes + (child.leaf ? 0 : 1);
-            size.blocks += below.blocks;
+            size.leaf_units += below.leaf_units;
         }
         return size;
     }
@@ -151,8 +144,8 @@ private:
                 Subtree& subtree = subtrees[next_subtree++];
                 subtree.node = node;
                 subtree.depth = 1;
-                children[static_cast<std::size_t>(i)] =
-                    slot.leaf ? block_child(subtree.first.blocks, subtree.size.blocks) : node_child(node);
+                Size at = subtree.first;
+                children[static_cast<std::size_t>(i)] = slot.leaf ? write_leaf(slot, at) : node_child(node);
             }
         }
         write_node(nodes_[place], treelet, children);
@@ -210,9 +203,11 @@ private:
 
     std::uint32_t write_leaf(const Slot& slot, Size& cursor) const {
         const LeafPrims prims(tree_, slot);
-        const std::size_t first = cursor.blocks;
-        cursor.blocks += Writer::write_blocks(mesh_, options_.accuracy, prims.span(), blocks_ + first);
-        return block_child(first, cursor.blocks - first);
+        const std::size_t first = cursor.leaf_units;
+        const LeafSize size =
+            Writer::write_leaf(mesh_, options_.accuracy, prims.span(), leaves_ + first * unit_bytes);
+        cursor.leaf_units += size.units;
+        return leaf_child(first_leaf_unit_ + first, size.blocks);
     }
 
     // Larger than any plane with its slack, small enough that no arithmetic on it overflows.
@@ -223,8 +218,8 @@ private:
     const BuildOptions& options_;
     const std::array<float, 3>& center_;
     StoredNode* nodes_ = nullptr;
-    Block* blocks_ = nullptr;
-    std::size_t first_block_unit_ = 0;
+    std::byte* leaves_ = nullptr;
+    std::size_t first_leaf_unit_ = 0;
 };
 
 }  // namespace

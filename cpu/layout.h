@@ -29,6 +29,8 @@ struct alignas(32) TriangleBlock {
     std::int32_t prim[block_width];
 
     float vertex(int k, int axis, int lane) const { return rows[3 * k + axis][lane]; }  // watertight
+    std::int32_t prim_at(int lane) const { return prim[lane]; }
+    const TriangleBlock* next() const { return this + 1; }
 };
 static_assert(sizeof(TriangleBlock) == 160);
 
@@ -37,7 +39,7 @@ enum class NodeForm { float32, compressed };
 inline constexpr int node_form_count = 2;
 
 // Nodes and blocks stand in one piece of memory, first the nodes, then the blocks, counted in units of 32 bytes:
-// a node is eight units, a block five (compressed: four and three). A child reference holds the unit where the child begins, times eight; a
+// a node is eight units, a block five (compressed: four, and three or four). A child reference holds the unit where the child begins, times eight; a
 // leaf sets leaf_bit and puts its number of blocks, less one, in the low three bits. So one mask and one shift lead
 // to a child of either kind.
 inline constexpr std::size_t unit_bytes = 32;

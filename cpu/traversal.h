@@ -26,7 +26,7 @@ struct StepCounters {
     [[gnu::always_inline]] void inner_node() { ++inner_nodes; }
     [[gnu::always_inline]] void leaf() { ++leaves; }
     [[gnu::always_inline]] void block(const auto& block) {
-        for (const std::int32_t prim : block.prim) triangles += prim >= 0;
+        for (int lane = 0; lane < block_width; ++lane) triangles += block.prim_at(lane) >= 0;
     }
     [[gnu::always_inline]] void write(const HitBatch& hits, std::size_t i) const {
         hits.stats[3 * i] = inner_nodes;
@@ -48,9 +48,9 @@ template <class Form>
 template <class Corners, class Triangles, class Query, class Counters>
 [[gnu::always_inline]] inline bool test_leaf(const typename Corners::Block* block, std::uint32_t count,
                                              const Triangles& triangles, Query& query, Counters& counters) {
-    for (std::uint32_t i = 0; i < count; ++i) {
-        counters.block(block[i]);
-        if (triangles.test(Corners(block[i]), query)) return true;
+    for (; count > 0; --count, block = block->next()) {
+        counters.block(*block);
+        if (triangles.test(Corners(*block), query)) return true;
     }
     return false;
 }

@@ -4,7 +4,9 @@
 #include <array>
 #include <bit>
 #include <cmath>
-#include <limits>
+#include <cstring>
+
+#include "ray.h"
 
 namespace wive {
 namespace {
@@ -63,13 +65,18 @@ public:
         return static_cast<int>(found - vertices_.begin());
     }
     int count() const { return count_; }
-    float coordinate(int vertex, int axis) const {
-        return std::bit_cast<float>(vertices_[static_cast<std::size_t>(vertex)][static_cast<std::size_t>(axis)]);
+    // How many a block must have room for.
+    int stored() const {
+        return count_ <= CompressedBlock::few_vertices ? CompressedBlock::few_vertices : CompressedBlock::most_vertices;
+    }
+    std::size_t units() const { return CompressedBlock::units(static_cast<std::size_t>(stored())); }
+    std::uint32_t bits(int vertex, int axis) const {
+        return vertices_[static_cast<std::size_t>(vertex)][static_cast<std::size_t>(axis)];
     }
 
 private:
     using Bits = std::array<std::uint32_t, 3>;
-    std::array<Bits, block_vertices + 3> vertices_;
+    std::array<Bits, CompressedBlock::most_vertices + 3> vertices_;
     int count_ = 0;
 };
 
@@ -93,7 +100,7 @@ public:
                     fewest = added;
                     best = i;
                 }
-            if (vertices.count() + fewest > block_vertices) break;
+            if (vertices.count() + fewest > CompressedBlock::most_vertices) break;
             for (int k = 0; k < 3; ++k) vertices.add(mesh_.corner(left_[best], k));
             block_[taken++] = left_[best];
             std::copy(left_.begin() + best + 1, left_.begin() + count_, left_.begin() + best);
@@ -109,20 +116,22 @@ private:
     std::size_t count_;
 };
 
-void write_block(const Mesh& mesh, std::span<const std::uint32_t> prims, SharedVertices vertices, CompressedBlock& block) {
-    for (int axis = 0; axis < 3; ++axis)
-        for (int i = 0; i < block_vertices; ++i)
-            block.rows[axis][i] = i < vertices.count() ? vertices.coordinate(i, axis) : 0.0f;
-    block.corners[0] = block.corners[1] = 0;
-    for (std::size_t lane = 0; lane < block_width; ++lane) {
-        block.prim[lane] = lane < prims.size() ? static_cast<std::int32_t>(prims[lane]) : -1;
-        if (lane >= prims.size()) continue;
+void write_block(const Mesh& mesh, std::span<const std::uint32_t> prims, SharedVertices vertices, std::byte* out) {
+    const int stored = vertices.stored();
+    std::uint32_t corners[2] = {0, static_cast<std::uint32_t>(stored) << 20};
+    for (std::size_t lane = 0; lane < prims.size(); ++lane) {
         for (int k = 0; k < 3; ++k) {
             const auto vertex = static_cast<std::uint32_t>(vertices.add(mesh.corner(prims[lane], k)));
-            block.corners[k >> 1] |= vertex << (16 * (k & 1) + 4 * static_cast<int>(lane));
+            corners[k >> 1] |= vertex << (16 * (k & 1) + 4 * static_cast<int>(lane));
         }
-        block.corners[1] |= 1u << (16 + lane);
+        corners[1] |= 1u << (16 + lane);
     }
+    std::array<std::uint32_t, 32> words{corners[0], corners[1]};  // of the largest block
+    std::size_t at = 2;
+    for (int axis = 0; axis < 3; ++axis)
+        for (int i = 0; i < stored; ++i) words[at++] = i < vertices.count() ? vertices.bits(i, axis) : 0;
+    for (std::size_t lane = 0; lane < block_width; ++lane) words[at++] = lane < prims.size() ? prims[lane] : no_prim;
+    std::memcpy(out, words.data(), vertices.units() * unit_bytes);
 }
 
 }  // namespace
@@ -151,23 +160,25 @@ void CompressedWriter::write_node(const wive::Node& node, int children, Node& ou
     }
 }
 
-std::size_t CompressedWriter::count_blocks(const Mesh& mesh, std::span<const std::uint32_t> prims) {
-    std::size_t blocks = 0;
-    for (LeafPacker packer(mesh, prims); !packer.done(); ++blocks) {
+LeafSize CompressedWriter::leaf_size(const Mesh& mesh, std::span<const std::uint32_t> prims) {
+    LeafSize size = {0, 0};
+    for (LeafPacker packer(mesh, prims); !packer.done(); ++size.blocks) {
         SharedVertices vertices;
         packer.next(vertices);
+        size.units += vertices.units();
     }
-    return blocks;
+    return size;
 }
 
-std::size_t CompressedWriter::write_blocks(const Mesh& mesh, Accuracy, std::span<const std::uint32_t> prims, Block* out) {
-    std::size_t blocks = 0;
-    for (LeafPacker packer(mesh, prims); !packer.done(); ++blocks) {
+LeafSize CompressedWriter::write_leaf(const Mesh& mesh, Accuracy, std::span<const std::uint32_t> prims, std::byte* out) {
+    LeafSize size = {0, 0};
+    for (LeafPacker packer(mesh, prims); !packer.done(); ++size.blocks) {
         SharedVertices vertices;
         const auto taken = packer.next(vertices);
-        write_block(mesh, taken, vertices, out[blocks]);
+        write_block(mesh, taken, vertices, out + size.units * unit_bytes);
+        size.units += vertices.units();
     }
-    return blocks;
+    return size;
 }
 
 }  // namespace wive

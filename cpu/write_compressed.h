@@ -6,6 +6,7 @@
 #include <span>
 
 #include "compressed.h"
+#include "emit.h"
 #include "layout.h"
 #include "mesh.h"
 
@@ -17,9 +18,9 @@ struct CompressedWriter {
 
     // Every box of `out` holds that of `node`, in exact arithmetic. children: how many lanes are used.
     static void write_node(const wive::Node& node, int children, Node& out);
-    static std::size_t count_blocks(const Mesh& mesh, std::span<const std::uint32_t> prims);
-    // Returns how many blocks it wrote. Blocks of both accuracies are the same.
-    static std::size_t write_blocks(const Mesh& mesh, Accuracy, std::span<const std::uint32_t> prims, Block* out);
+    static LeafSize leaf_size(const Mesh& mesh, std::span<const std::uint32_t> prims);
+    // The same for both accuracies.
+    static LeafSize write_leaf(const Mesh& mesh, Accuracy, std::span<const std::uint32_t> prims, std::byte* out);
 };
 
 }  // namespace wive

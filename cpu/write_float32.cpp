@@ -25,15 +25,15 @@ void write_triangle(const Mesh& mesh, Accuracy accuracy, TriangleBlock& block, s
 
 }  // namespace
 
-std::size_t Float32Writer::write_blocks(const Mesh& mesh, Accuracy accuracy, std::span<const std::uint32_t> prims,
-                                        Block* out) {
-    const Block* first = out;
-    for (std::size_t i = 0; i < prims.size(); i += block_width, ++out) {
+LeafSize Float32Writer::write_leaf(const Mesh& mesh, Accuracy accuracy, std::span<const std::uint32_t> prims,
+                                   std::byte* out) {
+    Block* block = reinterpret_cast<Block*>(out);
+    for (std::size_t i = 0; i < prims.size(); i += block_width, ++block) {
         const std::size_t count = std::min<std::size_t>(block_width, prims.size() - i);
-        if (count < block_width) clear_block(*out);
-        for (std::size_t k = 0; k < count; ++k) write_triangle(mesh, accuracy, *out, k, prims[i + k]);
+        if (count < block_width) clear_block(*block);
+        for (std::size_t k = 0; k < count; ++k) write_triangle(mesh, accuracy, *block, k, prims[i + k]);
     }
-    return static_cast<std::size_t>(out - first);
+    return leaf_size(mesh, prims);
 }
 
 }  // namespace wive

@@ -7,6 +7,7 @@
 
 #include "binary_tree.h"
 #include "builder.h"
+#include "emit.h"
 #include "layout.h"
 #include "mesh.h"
 
@@ -17,11 +18,11 @@ struct Float32Writer {
     using Block = TriangleBlock;
 
     static void write_node(const wive::Node& node, int, Node& out) { out = node; }
-    static std::size_t count_blocks(const Mesh&, std::span<const std::uint32_t> prims) {
-        return blocks_for(static_cast<std::uint32_t>(prims.size()));
+    static LeafSize leaf_size(const Mesh&, std::span<const std::uint32_t> prims) {
+        const std::uint32_t blocks = blocks_for(static_cast<std::uint32_t>(prims.size()));
+        return {blocks * (sizeof(Block) / unit_bytes), blocks};
     }
-    // Returns how many blocks it wrote.
-    static std::size_t write_blocks(const Mesh& mesh, Accuracy accuracy, std::span<const std::uint32_t> prims, Block* out);
+    static LeafSize write_leaf(const Mesh& mesh, Accuracy accuracy, std::span<const std::uint32_t> prims, std::byte* out);
 };
 
 }  // namespace wive
