@@ -107,8 +107,6 @@ void trace_released(const PyBvh& self, const std::string& kernel, QueryKind quer
                     const HitBatch& hits, unsigned threads, unsigned in_flight) {
     const KernelTable& table = find_kernels(kernel);
     const TraceBatch batch = table.find({query, self.bvh().accuracy(), self.bvh().node_form(), hits.stats != nullptr});
-    if (batch == nullptr)
-        throw std::invalid_argument("kernel '" + kernel + "' has no compressed form: use nodes 'float32' or another kernel");
     const BvhView bvh = self.bvh().view();
     py::gil_scoped_release release;
     trace(table, batch, bvh, rays.batch, hits, rays.count, threads, in_flight);

@@ -5,13 +5,13 @@
 
 namespace wive {
 
-// Two cache lines hold a node, and most blocks wherever they begin.
+// Two cache lines hold a node, three a block of either size wherever it begins.
 struct CompressedForm {
     using Node = CompressedNode;
     using Block = CompressedBlock;
     template <class Isa>
     using Corners = SharedCorners<Isa>;
-    static constexpr unsigned prefetched_lines = 2;
+    static constexpr unsigned prefetched_lines = 3;
 };
 
 // As FullSlabs; the distance to a plane is byte * (step * rdir) + (origin * rdir + bias).

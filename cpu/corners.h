@@ -33,7 +33,10 @@ struct SharedCorners {
     typename Isa::Pick pick[3];
 
     [[gnu::always_inline]] explicit SharedCorners(const Block& of)
-        : block(of), pick{{of.corners[0], 0}, {of.corners[0], 16}, {of.corners[1], 0}} {}
+        : block(of), pick{{of.corners[0], 0}, {of.corners[0], 16}, {of.corners[1], 0}} {
+        // Where rows begin is known only when the header has come; the cache line behind it need not wait for that.
+        __builtin_prefetch(reinterpret_cast<const std::byte*>(&of) + 64);
+    }
     [[gnu::always_inline]] Float4 vertex(std::size_t k, std::size_t axis) const {
         return pick[k](block.row(axis));
     }

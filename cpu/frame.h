@@ -23,6 +23,9 @@ namespace wive {
 // and the triangle test (triangle_watertight.h) moves a vertex sideways by at most 6u max(P + O). All of it is
 // below 12u M, M = max over the axes of (P + O); slack = |r| 16u M covers it. The near distance is lowered and the far
 // distance raised by it, so no box that holds a triangle the test accepts is ever missed.
+// Compressed planes (compressed_slabs.h) are met at fma(byte, step r, fma(origin, r, bias)). step r is exact, the step
+// being a power of two far from underflow; rounding the inner sum adds u(P + O), and the product of the byte 2u P where
+// there is no fused multiply-add. Such planes may lie up to a step outside, which is below P / 60: 15u M in all.
 // A component smaller than 2^-30 of the longest counts as that, with its sign: along the ray that moves a point by
 // less than 2^-29 M, which the same slack covers. (A subnormal direction stays shorter than 1 when scaled.)
 template <class Isa>

@@ -2,6 +2,8 @@
 #pragma once
 
 #include <array>
+#include <stdexcept>
+#include <string>
 #include <string_view>
 
 #include "layout.h"
@@ -42,8 +44,13 @@ struct KernelTable {
     std::size_t flight_bytes;  // of the largest kernel
     std::array<TraceBatch, kernel_count> kernels;
 
-    // Null where the table was not made for such nodes.
-    TraceBatch find(KernelChoice choice) const { return kernels[kernel_index(choice)]; }
+    // Throws std::invalid_argument where the table was not made for such nodes.
+    TraceBatch find(KernelChoice choice) const {
+        const TraceBatch kernel = kernels[kernel_index(choice)];
+        if (kernel == nullptr)
+            throw std::invalid_argument("kernel '" + std::string(name) + "' traces float32 nodes only: build with nodes 'float32'");
+        return kernel;
+    }
 };
 
 // Null where this build has no such kernels; whether the machine can run them is dispatch.h's business.
