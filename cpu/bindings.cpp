@@ -5,6 +5,7 @@
 
 #include <memory>
 #include <optional>
+#include <span>
 #include <stdexcept>
 #include <string>
 
@@ -49,6 +50,12 @@ const char* accuracy_name(Accuracy accuracy) {
     return accuracy == Accuracy::fast ? "fast" : accuracy == Accuracy::watertight ? "watertight" : "exact";
 }
 
+NodeForm parse_nodes(const std::string& name) {
+    if (name == "float32") return NodeForm::float32;
+    expect(name == "compressed", "nodes: expected 'float32' or 'compressed'");
+    return NodeForm::compressed;
+}
+
 ChildOrder parse_order(const std::string& name) {
     if (name == "treelet") return ChildOrder::treelet;
     if (name == "diagonal") return ChildOrder::diagonal;
@@ -60,12 +67,12 @@ ChildOrder parse_order(const std::string& name) {
 class PyBvh {
 public:
     PyBvh(Array<float> vertices, Array<std::int32_t> faces, const std::string& accuracy, const std::string& order,
-          unsigned threads, int depth_limit)
+          unsigned threads, int depth_limit, const std::string& nodes)
         : vertices_(std::move(vertices)), faces_(std::move(faces)) {
         expect_shape(vertices_, 3, "vertices: expected shape (v, 3)");
         expect_shape(faces_, 3, "faces: expected shape (f, 3)");
         expect(depth_limit >= 1 && depth_limit <= max_depth, "depth_limit: expected 1 to 64");
-        const BuildOptions options = {parse_accuracy(accuracy), parse_order(order), threads, depth_limit};
+        const BuildOptions options = {parse_accuracy(accuracy), parse_nodes(nodes), parse_order(order), threads, depth_limit};
         const Mesh view = mesh();
         py::gil_scoped_release release;
         bvh_ = std::make_unique<Bvh>(view, options);
@@ -105,7 +112,7 @@ Rays ray_batch(const Array<float>& origins, const Array<float>& directions, cons
 void trace_released(const PyBvh& self, const std::string& kernel, QueryKind query, const Rays& rays,
                     const HitBatch& hits, unsigned threads, unsigned in_flight) {
     const KernelTable& table = find_kernels(kernel);
-    const TraceBatch batch = table.find({query, self.bvh().accuracy(), hits.stats != nullptr});
+    const TraceBatch batch = table.find({query, self.bvh().accuracy(), self.bvh().node_form(), hits.stats != nullptr});
     const BvhView bvh = self.bvh().view();
     py::gil_scoped_release release;
     trace(table, batch, bvh, rays.batch, hits, rays.count, threads, in_flight);
@@ -165,7 +172,7 @@ py::tuple intersect_all(const PyBvh& self, const std::string& kernel, const Arra
     std::optional<Array<std::int32_t>> steps;
     std::int32_t* steps_data = stats ? steps.emplace(std::vector<py::ssize_t>{n, 3}).mutable_data() : nullptr;
     const KernelTable& table = find_kernels(kernel);
-    const TraceBatch batch = table.find({QueryKind::all, self.bvh().accuracy(), stats});
+    const TraceBatch batch = table.find({QueryKind::all, self.bvh().accuracy(), self.bvh().node_form(), stats});
     const BvhView bvh = self.bvh().view();
     std::int64_t* offsets_data = offsets.mutable_data();
     std::optional<Gathering> gathering;
@@ -199,6 +206,7 @@ std::uint64_t render(const PyBvh& self, const std::string& kernel, const Array<f
                            self.mesh(),
                            find_kernels(kernel),
                            self.bvh().accuracy(),
+                           self.bvh().node_form(),
                            {row(0), row(1), row(2), row(3)},
                            static_cast<int>(image.shape(1)),
                            static_cast<int>(image.shape(0)),
@@ -220,6 +228,14 @@ py::array_t<T> view(py::handle owner, std::vector<py::ssize_t> shape, const T* d
     return array;
 }
 
+// Nodes or blocks as words, in rows of so many.
+py::array_t<std::uint32_t> rows(py::handle owner, std::span<const std::byte> data, std::size_t each, std::size_t columns) {
+    return view(owner,
+                {static_cast<py::ssize_t>(data.size() / each), static_cast<py::ssize_t>(each / 4 / columns),
+                 static_cast<py::ssize_t>(columns)},
+                reinterpret_cast<const std::uint32_t*>(data.data()));
+}
+
 template <std::size_t n>
 py::array_t<float> copy(const std::array<float, n>& values) {
     return py::array_t<float>(static_cast<py::ssize_t>(n), values.data());
@@ -239,18 +255,18 @@ PYBIND11_MODULE(_cpu, m, py::mod_gil_not_used()) {
     });
     const auto array = [](const char* name) { return py::arg(name).noconvert(); };
     py::class_<PyBvh>(m, "Bvh")
-        .def(py::init<Array<float>, Array<std::int32_t>, const std::string&, const std::string&, unsigned, int>(),
+        .def(py::init<Array<float>, Array<std::int32_t>, const std::string&, const std::string&, unsigned, int,
+                      const std::string&>(),
              array("vertices"), array("faces"), py::arg("accuracy") = "watertight", py::arg("order") = "treelet",
-             py::arg("threads") = 0, py::arg("depth_limit") = max_depth)
+             py::arg("threads") = 0, py::arg("depth_limit") = max_depth, py::arg("nodes") = "float32")
         .def_property_readonly("nodes", [](py::object self) {
-            const auto nodes = self.cast<const PyBvh&>().bvh().nodes();
-            return view(self, {static_cast<py::ssize_t>(nodes.size()), 8, 8},
-                        reinterpret_cast<const std::uint32_t*>(nodes.data()));
+            const Bvh& bvh = self.cast<const PyBvh&>().bvh();
+            return rows(self, bvh.nodes(), bvh.node_bytes(), 8);
         })
         .def_property_readonly("blocks", [](py::object self) {
-            const auto blocks = self.cast<const PyBvh&>().bvh().blocks();
-            return view(self, {static_cast<py::ssize_t>(blocks.size()), 10, 4},
-                        reinterpret_cast<const std::uint32_t*>(blocks.data()));
+            const Bvh& bvh = self.cast<const PyBvh&>().bvh();
+            if (bvh.node_form() == NodeForm::compressed) return rows(self, bvh.blocks(), unit_bytes, 8);
+            return rows(self, bvh.blocks(), sizeof(TriangleBlock), 4);
         })
         .def_property_readonly("units", [](py::object self) {
             const Bvh& bvh = self.cast<const PyBvh&>().bvh();
@@ -270,6 +286,9 @@ PYBIND11_MODULE(_cpu, m, py::mod_gil_not_used()) {
         })
         .def_property_readonly("accuracy", [](const PyBvh& self) {
             return accuracy_name(self.bvh().accuracy());
+        })
+        .def_property_readonly("node_form", [](const PyBvh& self) {
+            return self.bvh().node_form() == NodeForm::float32 ? "float32" : "compressed";
         })
         .def_property_readonly("depth", [](const PyBvh& self) { return self.bvh().depth(); })
         .def_property_readonly("memory", [](const PyBvh& self) {

@@ -116,7 +116,7 @@ private:
         hits.t = t_.data();
         hits.prim = prim_.data();
         hits.uv = uv_.data();
-        wive::trace(job_.kernels, job_.kernels.find({QueryKind::closest, job_.accuracy, false}), job_.bvh,
+        wive::trace(job_.kernels, job_.kernels.find({QueryKind::closest, job_.accuracy, job_.nodes, false}), job_.bvh,
                     {origins_.data(), directions_.data(), &zero, &infinity, 0, 0}, hits, paths_.size(), 1, 0);
     }
 

@@ -20,6 +20,7 @@ struct RenderJob {
     Mesh mesh;
     const KernelTable& kernels;  // the only thing that differs between instruction sets
     Accuracy accuracy;
+    NodeForm nodes;
     Camera camera;
     int width, height;
     int samples, bounces;

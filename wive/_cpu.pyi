@@ -28,6 +28,7 @@ class Bvh:
         order: Literal["treelet", "diagonal", "none"] = "treelet",
         threads: int = 0,
         depth_limit: int = 64,
+        nodes: Literal["float32", "compressed"] = "float32",
     ) -> None:
         """Build over vertices (v,3), faces (f,3). threads 0 means every core.
 
@@ -36,13 +37,19 @@ class Bvh:
         """
     @property
     def nodes(self) -> NDArray[np.uint32]:
-        """(m,8,8) read-only view, rows lo.x hi.x lo.y hi.y lo.z hi.z child order; planes are float32 bits."""
+        """(m,8,8) read-only view, rows lo.x hi.x lo.y hi.y lo.z hi.z child order; planes are float32 bits.
+
+        Compressed: (m,4,8), the 128 bytes of CompressedNode in cpu/compressed.h.
+        """
     @property
     def blocks(self) -> NDArray[np.uint32]:
-        """(b,10,4) read-only view: nine float32 rows (fast: v0 e1 e2; else: v0 v1 v2), the prim row."""
+        """(b,10,4) read-only view: nine float32 rows (fast: v0 e1 e2; else: v0 v1 v2), the prim row.
+
+        Compressed: (units,8), blocks of three or four units, CompressedBlock in cpu/compressed.h.
+        """
     @property
     def units(self) -> NDArray[np.uint32]:
-        """(8 m + 5 b, 8) read-only view of all of it: nodes, then blocks, in units of 32 bytes.
+        """(units,8) read-only view of all of it: nodes, then blocks, in units of 32 bytes.
 
         A child reference holds (unit << 3); a leaf sets bit 31 and its number of blocks less one in the low 3
         bits.
@@ -58,6 +65,9 @@ class Bvh:
         """(2,3) lowest and highest corner of the triangles that can be hit; inf, -inf without any."""
     @property
     def accuracy(self) -> str: ...
+    @property
+    def node_form(self) -> str:
+        """ "float32" or "compressed"."""
     @property
     def depth(self) -> int:
         """Inner nodes on the longest way from the root down."""

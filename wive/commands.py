@@ -89,7 +89,7 @@ def describe_mesh(options: Namespace) -> None:
         ("bounds", f"{low} to {high}"),
         ("backend", _tracer(scene)),
         ("accuracy", scene.accuracy),
-        ("nodes", f"{len(tree.nodes):,}"),
+        ("nodes", f"{len(tree.nodes):,} {scene.nodes}"),
         ("depth", f"{tree.depth}"),
         (
             "SAH cost",
@@ -110,7 +110,14 @@ def list_backends(options: Namespace) -> None:
 
 
 def _scene(options: Namespace, vertices: NDArray[Any], faces: NDArray[Any]) -> Scene:
-    return Scene(vertices, faces, backend=options.backend, device=options.device, accuracy=options.accuracy)
+    return Scene(
+        vertices,
+        faces,
+        backend=options.backend,
+        device=options.device,
+        accuracy=options.accuracy,
+        nodes=options.nodes,
+    )
 
 
 def _usable(backend: Backend) -> str:
