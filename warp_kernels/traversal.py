@@ -18,11 +18,11 @@ from wive.warp_kernels.frame import RayFrame, is_negative
 from wive.warp_kernels.handle import (
     ALL_BITS,
     BLOCK_WIDTH,
+    COMPRESSED_NODE_WORDS,
     CORRUPT,
     END_OF_STACK,
     HANDLES,
     NO_PRIM,
-    COMPRESSED_NODE_WORDS,
     NODE_WIDTH,
     NODE_WORDS,
     SIGN_BIT,
@@ -68,7 +68,10 @@ def unsortable(key: wp.uint32):
 def make_traversal(
     query: str, accuracy: str, length: int, entries: int, counters: bool, nodes: str = "float32"
 ) -> wp.Function:
-    """The traversal for one query, accuracy, lane form and node form; that many stack entries must do for the tree."""
+    """The traversal for one query, accuracy, lane form and node form.
+
+    That many stack entries must do for the tree.
+    """
     asked = QUERIES[query]
     in_order: bool = asked.in_order
     make_triangles, kept_words = TRIANGLES[accuracy]
@@ -149,18 +152,17 @@ def make_traversal(
 
 def make_count(form: SimpleNamespace) -> wp.Function:
     """The count of the triangles that blocks of this form hold."""
-    prim_at, skip = form.prim_at, form.skip
+    prim_at, block_at = form.prim_at, form.block_at
 
     @without_gradient
     @wp.func
     def count_triangles(units: wp.uint64, begin: int, blocks: int):
         count = int(0)  # noqa: RUF046, UP018
-        block = int(begin)
-        for _ in range(blocks):
+        for i in range(blocks):
+            block = block_at(units, begin, i)
             for j in range(wp.static(BLOCK_WIDTH)):
                 if wp.cast(load_float(units, prim_at(units, block, j)), wp.int32) >= 0:
                     count += 1
-            block = skip(units, block, 1, 1)
         return count
 
     return count_triangles
@@ -181,7 +183,7 @@ def make_leaf_test(
     stack_argument = lanes.stack_argument
     candidates, solve = triangles.candidates, triangles.solve
     offer, done = asked.offer, asked.done
-    prim_at, skip = form.prim_at, form.skip
+    prim_at, block_at = form.prim_at, form.block_at
     length: int = lanes.triangles_length
     block_step: int = lanes.block_step
 
@@ -200,8 +202,8 @@ def make_leaf_test(
         leaf.best = best
         leaf.last = 7
         i = int(lane // wp.static(BLOCK_WIDTH))
-        block = int(skip(units, begin, i, blocks))
         while i < blocks:
+            block = block_at(units, begin, i)
             found = candidates(units, block, lane, stack)
             left = wp.uint32(found[0])
             while left != wp.uint32(0):
@@ -214,7 +216,6 @@ def make_leaf_test(
             if done(leaf.best):
                 leaf.last = i
                 break
-            block = skip(units, block, block_step, blocks - i)
             i += block_step
         return leaf
 
