@@ -1,8 +1,8 @@
 """The two forms of a triangle block, as cpu/layout.h and cpu/compressed.h: where its corners and prims stand.
 
-A vertex is found at the word `vertex_at`, its axes `stride` words apart. `skip` goes some
-blocks on in a leaf of which so many are left. `load` reads a vertex of the thread's
-triangles, `edge` and `edge_at` what lies between two of them: `fast` float32 trees store that.
+A vertex is found at the word `vertex_at`, its axes `stride` words apart. `block_at` is the
+i-th block of a leaf. `load` reads a vertex of the thread's
+triangles, `edge` and `edge_at` what lies between the first and another: `fast` float32 trees store that.
 """
 
 from types import SimpleNamespace
@@ -18,11 +18,11 @@ from wive.warp_kernels.native import PICK_1, PICK_4
 
 def float32_block(lanes: SimpleNamespace) -> SimpleNamespace:
     """Four triangles side by side; NaN fails every test in the lanes that are not used."""
-    load_triangles, vector = lanes.load_triangles, lanes.triangles
+    load_triangles = lanes.load_triangles
 
     @wp.func
-    def skip(units: wp.uint64, block: int, count: int, left: int):
-        return block + wp.static(BLOCK_WORDS) * count
+    def block_at(units: wp.uint64, begin: int, i: int):
+        return begin + wp.static(BLOCK_WORDS) * i
 
     @wp.func
     def stride(units: wp.uint64, block: int):
@@ -41,7 +41,7 @@ def float32_block(lanes: SimpleNamespace) -> SimpleNamespace:
         return load_triangles(units, block + 12 * k + 4 * axis, lane)
 
     @wp.func
-    def edge(units: wp.uint64, block: int, lane: int, k: int, axis: int, v0: vector):
+    def edge(units: wp.uint64, block: int, lane: int, k: int, axis: int):
         return load_triangles(units, block + 12 * k + 4 * axis, lane)
 
     @wp.func
@@ -52,7 +52,7 @@ def float32_block(lanes: SimpleNamespace) -> SimpleNamespace:
     def used(units: wp.uint64, block: int, lane: int, passed: wp.uint32):
         return passed
 
-    return _block(BLOCK_WORDS, skip, stride, vertex_at, prim_at, load, edge, edge_at, used)
+    return _block(BLOCK_WORDS, block_at, stride, vertex_at, prim_at, load, edge, edge_at, used)
 
 
 def compressed_block(lanes: SimpleNamespace) -> SimpleNamespace:
@@ -69,11 +69,10 @@ def compressed_block(lanes: SimpleNamespace) -> SimpleNamespace:
         return int(header(units, block + 1) >> wp.uint32(20))
 
     @wp.func
-    def skip(units: wp.uint64, block: int, count: int, left: int):
-        at = int(block)
-        for i in range(count):
-            if i < left:
-                at += 4 * stride(units, at)
+    def block_at(units: wp.uint64, begin: int, i: int):
+        at = int(begin)
+        for _ in range(i):  # rarely more than once
+            at += 4 * stride(units, at)
         return at
 
     @wp.func
@@ -94,8 +93,8 @@ def compressed_block(lanes: SimpleNamespace) -> SimpleNamespace:
         return pick(units, block + 2 + axis * stride(units, block), numbers, lane)
 
     @wp.func
-    def edge(units: wp.uint64, block: int, lane: int, k: int, axis: int, v0: vector):
-        return load(units, block, lane, k, axis) - v0
+    def edge(units: wp.uint64, block: int, lane: int, k: int, axis: int):
+        return load(units, block, lane, k, axis) - load(units, block, lane, 0, axis)
 
     @wp.func
     def edge_at(units: wp.uint64, at: int, v0: float):
@@ -106,11 +105,11 @@ def compressed_block(lanes: SimpleNamespace) -> SimpleNamespace:
         lanes = (header(units, block + 1) >> wp.uint32(16)) & wp.uint32(15)
         return passed & (lanes >> wp.uint32(wp.where(length == 1, lane & 3, 0)))
 
-    return _block(LEAST_COMPRESSED_WORDS, skip, stride, vertex_at, prim_at, load, edge, edge_at, used)
+    return _block(LEAST_COMPRESSED_WORDS, block_at, stride, vertex_at, prim_at, load, edge, edge_at, used)
 
 
 def _block(least_words: int, *functions: wp.Function) -> SimpleNamespace:
-    names = ("skip", "stride", "vertex_at", "prim_at", "load", "edge", "edge_at", "used")
+    names = ("block_at", "stride", "vertex_at", "prim_at", "load", "edge", "edge_at", "used")
     found = {name: without_gradient(function) for name, function in zip(names, functions, strict=True)}
     return SimpleNamespace(least_words=least_words, **found)
 

@@ -17,7 +17,7 @@ BLOCK_WORDS = 40
 CHILD_ROW = 48
 RANK_ROW = 56  # the order row, inverted by `upload`: lane i holds its own place in each octant's order
 PRIM_ROW = 36
-# cpu/compressed.h, in words: a node, its three-byte order lanes and its children, the smaller of the two blocks
+# cpu/compressed.h, in words: a node, its order lanes of three bytes, its children; the smaller of both blocks
 COMPRESSED_NODE_WORDS = 32
 COMPRESSED_ORDERS = 18
 COMPRESSED_CHILD_ROW = 24

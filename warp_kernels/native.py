@@ -135,7 +135,8 @@ RANKS_8 = """
     wp::vec_t<8, wp::uint32> ranks;
     for (int half = 0; half < 2; ++half) {
 #if defined(__CUDA_ARCH__)
-        const unsigned a = __ldg(row + 3 * half), b = __ldg(row + 3 * half + 1), c = __ldg(row + 3 * half + 2);
+        const unsigned a = __ldg(row + 3 * half), b = __ldg(row + 3 * half + 1);
+        const unsigned c = __ldg(row + 3 * half + 2);
 #else
         const unsigned a = row[3 * half], b = row[3 * half + 1], c = row[3 * half + 2];
 #endif

@@ -11,7 +11,10 @@ from wive.warp_kernels.lanes import without_gradient
 
 
 def make_visit(lanes: SimpleNamespace, form: SimpleNamespace, entries: int, in_order: bool) -> wp.Function:
-    """The visit for these lanes and form of nodes; entries: what the stack holds; in_order: whether the nearest goes on top."""
+    """The visit for these lanes and form of nodes.
+
+    entries: what the stack holds; in_order: whether the nearest goes on top.
+    """
     length = lanes.length
     vector = lanes.vector
     distances, load_ranks, has_child = form.distances, form.ranks, form.has_child

@@ -79,7 +79,10 @@ def unsortable(key: wp.uint32):
 def make_traversal(
     query: str, accuracy: str, length: int, entries: int, counters: bool, nodes: str = "float32"
 ) -> wp.Function:
-    """The traversal for one query, accuracy, lane form and node form; that many stack entries must do for the tree."""
+    """The traversal for one query, accuracy, lane form and node form.
+
+    That many stack entries must do for the tree.
+    """
     traverse_from = make_traversal_from(query, accuracy, length, entries, counters, nodes)
     begin, tree_type, state_type = QUERIES[query].begin, HANDLES[accuracy], STATES[QUERIES[query].state]
 
@@ -176,18 +179,17 @@ def make_traversal_from(
 
 def make_count(form: SimpleNamespace) -> wp.Function:
     """The count of the triangles that blocks of this form hold."""
-    prim_at, skip = form.prim_at, form.skip
+    prim_at, block_at = form.prim_at, form.block_at
 
     @without_gradient
     @wp.func
     def count_triangles(units: wp.uint64, begin: int, blocks: int):
         count = int(0)  # noqa: RUF046, UP018
-        block = int(begin)
-        for _ in range(blocks):
+        for i in range(blocks):
+            block = block_at(units, begin, i)
             for j in range(wp.static(BLOCK_WIDTH)):
                 if wp.cast(load_float(units, prim_at(units, block, j)), wp.int32) >= 0:
                     count += 1
-            block = skip(units, block, 1, 1)
         return count
 
     return count_triangles
@@ -222,7 +224,7 @@ def make_leaf_test(
     candidates, solve = triangles.candidates, triangles.solve
     offer, done = asked.offer, asked.done
     best_type, leaf_type = asked.state, LEAVES[asked.state]
-    prim_at, skip = form.prim_at, form.skip
+    prim_at, block_at = form.prim_at, form.block_at
     length: int = lanes.triangles_length
     block_step: int = lanes.block_step
 
@@ -241,8 +243,8 @@ def make_leaf_test(
         leaf.best = best
         leaf.last = 7
         i = int(lane // wp.static(BLOCK_WIDTH))
-        block = int(skip(units, begin, i, blocks))
         while i < blocks:
+            block = block_at(units, begin, i)
             found = candidates(units, block, lane, stack)
             left = wp.uint32(found[0])
             while left != wp.uint32(0):
@@ -255,7 +257,6 @@ def make_leaf_test(
             if done(leaf.best):
                 leaf.last = i
                 break
-            block = skip(units, block, block_step, blocks - i)
             i += block_step
         return leaf
 

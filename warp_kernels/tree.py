@@ -43,7 +43,8 @@ class Tree:
     """A tree on a Warp device, made by `upload`.
 
     `handle` is what kernels take: a `Bvh`, or a `FastBvh` where accuracy is "fast". `stack` is the number of
-    stack entries its kernels are compiled for, `nodes` the form: "float32" or "compressed". `memory` counts bytes on the device.
+    stack entries its kernels are compiled for, `nodes` is "float32" or "compressed". `memory` counts bytes on
+    the device.
     """
 
     device: wp.Device
@@ -72,7 +73,14 @@ def upload(bvh: _cpu.Bvh, device: wp.DeviceLike = None) -> Tree:
     units: wp.array[Any] = wp.array(bvh.units.reshape(-1).view(np.float32), dtype=wp.float32, device=place)
     error = wp.zeros(1, dtype=wp.int32, device=place)
     needed = stack_entries(nodes)
-    wp.launch(INVERT_ORDERS[bvh.node_form], dim=len(nodes), inputs=[units], device=place, block_dim=128, record_tape=False)
+    wp.launch(
+        INVERT_ORDERS[bvh.node_form],
+        dim=len(nodes),
+        inputs=[units],
+        device=place,
+        block_dim=128,
+        record_tape=False,
+    )
 
     handle = HANDLES[bvh.accuracy]()
     handle.units = units
@@ -105,7 +113,9 @@ def check(tree: Tree) -> None:
 
 
 def stack_entries(nodes: NDArray[np.uint32]) -> int:
-    """The most entries that a traversal of nodes (m,8,8), or (m,4,8) compressed, can have on its stack, and room for eight more.
+    """The most entries that a traversal can have on its stack, and room for eight more.
+
+    nodes: (m,8,8), or (m,4,8) compressed.
 
     A visit pushes at most all children, of which one is taken before the next visit. Below them is the entry
     that ends the traversal.

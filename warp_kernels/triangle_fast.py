@@ -69,7 +69,9 @@ def fast_triangles(lanes: SimpleNamespace, form: SimpleNamespace, kept: int) -> 
         """t, u and v of the block's triangle j, which the ray meets."""
         stride = stride_of(units, block)
         at = vertex_at(units, block, 0, j)
-        v0 = wp.vec3(load_float(units, at), load_float(units, at + stride), load_float(units, at + 2 * stride))
+        v0 = wp.vec3(
+            load_float(units, at), load_float(units, at + stride), load_float(units, at + 2 * stride)
+        )
         e1 = edge_vector(units, vertex_at(units, block, 1, j), stride, v0)
         e2 = edge_vector(units, vertex_at(units, block, 2, j), stride, v0)
         d = kept_vector(stack, 3)
@@ -90,18 +92,15 @@ def fast_triangles(lanes: SimpleNamespace, form: SimpleNamespace, kept: int) -> 
         d0 = vector(d[0])
         d1 = vector(d[1])
         d2 = vector(d[2])
-        x = load(units, block, lane, 0, 0)
-        y = load(units, block, lane, 0, 1)
-        z = load(units, block, lane, 0, 2)
-        sx = vector(o[0]) - x
-        sy = vector(o[1]) - y
-        sz = vector(o[2]) - z
-        e1x = edge(units, block, lane, 1, 0, x)
-        e1y = edge(units, block, lane, 1, 1, y)
-        e1z = edge(units, block, lane, 1, 2, z)
-        e2x = edge(units, block, lane, 2, 0, x)
-        e2y = edge(units, block, lane, 2, 1, y)
-        e2z = edge(units, block, lane, 2, 2, z)
+        sx = vector(o[0]) - load(units, block, lane, 0, 0)
+        sy = vector(o[1]) - load(units, block, lane, 0, 1)
+        sz = vector(o[2]) - load(units, block, lane, 0, 2)
+        e1x = edge(units, block, lane, 1, 0)
+        e1y = edge(units, block, lane, 1, 1)
+        e1z = edge(units, block, lane, 1, 2)
+        e2x = edge(units, block, lane, 2, 0)
+        e2y = edge(units, block, lane, 2, 1)
+        e2z = edge(units, block, lane, 2, 2)
         px = products(d1, e2z) - products(d2, e2y)
         py = products(d2, e2x) - products(d0, e2z)
         pz = products(d0, e2y) - products(d1, e2x)

@@ -89,7 +89,8 @@ def describe_mesh(options: Namespace) -> None:
         ("bounds", f"{low} to {high}"),
         ("backend", _tracer(scene)),
         ("accuracy", scene.accuracy),
-        ("nodes", f"{len(tree.nodes):,} {scene.nodes}"),
+        ("nodes", f"{len(tree.nodes):,}"),
+        ("form", f"{scene.nodes} nodes"),
         ("depth", f"{tree.depth}"),
         (
             "SAH cost",

@@ -51,8 +51,8 @@ class Scene(CrossingQueries):
                 device, else "cpu". A device alone implies backend "warp"; CPU backends take none.
             accuracy: "watertight" (rays never slip between triangles that share an edge or vertex), "fast", or
                 "exact" (hits, their order, t and uv are those of exact arithmetic, rounded once).
-            nodes: "float32", or "compressed": the same hits from a tree of less than two thirds the bytes. Slower
-                where the tree fits into the processor's caches, faster where it does not.
+            nodes: "float32", or "compressed": the same hits from a tree of less than two thirds the bytes;
+                slower where trees fit into the processor's caches, faster where they don't.
 
         C-contiguous float32 vertices and int32 faces are kept, not copied: don't change them afterwards.
 
