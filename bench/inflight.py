@@ -167,7 +167,7 @@ def draw(rows: Sequence[report.Row]) -> Figure:
             flights, mrays, limit, waits = (
                 [row[name] for row in chosen] for name in ("in_flight", "mrays", "limit_mrays", "latency_ns")
             )
-            label = f"{scene}, {chosen[0]['triangles'] / 1e6:.3g} M"
+            label = f"{scene}: {chosen[0]['triangles']:,} triangles"
             speed.plot(flights, mrays, marker="o", markersize=3, color=f"C{i}", label=label)
             speed.plot(flights, limit, linestyle="--", linewidth=0.8, color=f"C{i}")
             latency.plot(flights, waits, marker="o", markersize=3, color=f"C{i}")

@@ -172,6 +172,8 @@ def draw(means: Sequence[report.Row]) -> Figure:
         panel.bar_label(bars, fmt="%.1f", fontsize=8, padding=2)
     panel.axvline(1.0, color="0.4", linewidth=1)
     panel.set_xscale("log")
+    panel.xaxis.set_major_formatter("{x:g}")
+    panel.xaxis.set_minor_formatter("")
     panel.set_xlabel("the other's seconds over wive's, geometric mean over scenes and rays", fontsize=9)
     panel.set_yticks(range(len(rivals)), rivals, fontsize=8)
     panel.set_ylim(len(rivals) - 0.5, -0.5)
