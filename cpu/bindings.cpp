@@ -11,6 +11,7 @@
 
 #include "builder.h"
 #include "dispatch.h"
+#include "gather.h"
 #include "parallel.h"
 #include "render.h"
 #include "trace.h"
@@ -138,6 +139,50 @@ py::tuple occluded(const PyBvh& self, const std::string& kernel, const Array<flo
     return py::make_tuple(std::move(mask), std::move(steps));
 }
 
+py::tuple count(const PyBvh& self, const std::string& kernel, const Array<float>& origins,
+                const Array<float>& directions, const Array<float>& tmin, const Array<float>& tmax, unsigned threads,
+                unsigned in_flight, bool stats) {
+    const Rays rays = ray_batch(origins, directions, tmin, tmax);
+    const py::ssize_t n = origins.shape(0);
+    Array<std::int32_t> counts(n);
+    std::optional<Array<std::int32_t>> steps;
+    HitBatch hits;
+    hits.count = counts.mutable_data();
+    if (stats) hits.stats = steps.emplace(std::vector<py::ssize_t>{n, 3}).mutable_data();
+    trace_released(self, kernel, QueryKind::count, rays, hits, threads, in_flight);
+    return py::make_tuple(std::move(counts), std::move(steps));
+}
+
+py::tuple intersect_all(const PyBvh& self, const std::string& kernel, const Array<float>& origins,
+                        const Array<float>& directions, const Array<float>& tmin, const Array<float>& tmax,
+                        unsigned threads, unsigned in_flight, bool stats) {
+    const Rays rays = ray_batch(origins, directions, tmin, tmax);
+    const py::ssize_t n = origins.shape(0);
+    Array<std::int64_t> offsets(n + 1);
+    std::optional<Array<std::int32_t>> steps;
+    std::int32_t* steps_data = stats ? steps.emplace(std::vector<py::ssize_t>{n, 3}).mutable_data() : nullptr;
+    const KernelTable& table = find_kernels(kernel);
+    const TraceBatch batch = table.find({QueryKind::all, self.bvh().accuracy(), stats});
+    const BvhView bvh = self.bvh().view();
+    std::int64_t* offsets_data = offsets.mutable_data();
+    std::optional<Gathering> gathering;
+    {
+        py::gil_scoped_release release;
+        gathering.emplace(table, batch, bvh, rays.batch, rays.count, steps_data, threads, in_flight);
+        gathering->write_offsets(offsets_data);
+    }
+    const auto total = static_cast<py::ssize_t>(offsets_data[n]);
+    Array<float> t(total), uv({total, py::ssize_t{2}});
+    Array<std::int32_t> prim(total);
+    const SortedHits hits = {offsets_data, t.mutable_data(), prim.mutable_data(), uv.mutable_data()};
+    {
+        py::gil_scoped_release release;
+        gathering->sort_into(hits);
+        gathering.reset();  // long lists take a while to free
+    }
+    return py::make_tuple(std::move(offsets), std::move(t), std::move(prim), std::move(uv), std::move(steps));
+}
+
 // Function and context as ctypes gives their addresses.
 ForeignTracer foreign_tracer(const std::optional<std::pair<std::uintptr_t, std::uintptr_t>>& addresses) {
     if (!addresses) return {};
@@ -243,6 +288,10 @@ PYBIND11_MODULE(_cpu, m, py::mod_gil_not_used()) {
         .def("intersect", &intersect, py::arg("kernel"), array("origins"), array("directions"), array("tmin"),
              array("tmax"), py::arg("threads") = 0, py::arg("in_flight") = 0, py::arg("stats") = false)
         .def("occluded", &occluded, py::arg("kernel"), array("origins"), array("directions"), array("tmin"),
+             array("tmax"), py::arg("threads") = 0, py::arg("in_flight") = 0, py::arg("stats") = false)
+        .def("intersect_all", &intersect_all, py::arg("kernel"), array("origins"), array("directions"), array("tmin"),
+             array("tmax"), py::arg("threads") = 0, py::arg("in_flight") = 0, py::arg("stats") = false)
+        .def("count", &count, py::arg("kernel"), array("origins"), array("directions"), array("tmin"),
              array("tmax"), py::arg("threads") = 0, py::arg("in_flight") = 0, py::arg("stats") = false)
         .def("render_rows", &render, py::arg("kernel"), array("camera"), array("image"), py::arg("row_begin"),
              py::arg("row_end"), py::arg("samples"), py::arg("bounces"), py::arg("albedo"), py::arg("seed") = 0,

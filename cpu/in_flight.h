@@ -11,33 +11,21 @@
 
 namespace wive {
 
-template <class Isa, class Query, class Counters>
+template <class Isa, template <class> class Triangles, class Query, class Counters>
 struct alignas(64) Flight {
     RayFrame<Isa> ray;
+    [[no_unique_address]] typename Triangles<Isa>::PerRay per_ray;
     Query query{0, 0};
-    Counters counters;
+    [[no_unique_address]] Counters counters;
     Stack::Top top;
     std::size_t index = 0;  // of the ray in its batch
     Stack stack;
 };
 
-// Flights that wait for the same kind of step, so that each kind has a loop to itself and no step has to ask.
-template <class State>
-struct Waiting {
-    State* flights[max_in_flight];
-    unsigned count = 0;
-
-    // Writes always, counts only if it is so: no branch.
-    [[gnu::always_inline]] void add_if(bool condition, State* flight) {
-        flights[count] = flight;
-        count += condition;
-    }
-};
-
 template <class Isa, template <class> class Slabs, template <class> class Triangles, class Query, class Counters>
 class InFlight {
 public:
-    using State = Flight<Isa, Query, Counters>;
+    using State = Flight<Isa, Triangles, Query, Counters>;
 
     [[gnu::always_inline]] InFlight(const BvhView& bvh, const RayBatch& rays, const HitBatch& hits,
                                     const RaySource& source, std::byte* scratch)
@@ -47,7 +35,7 @@ public:
         for (unsigned i = 0; i < in_flight; ++i) {
             start(*new (flights_ + i) State);
         }
-        while (at_node_.count + at_leaf_.count > 0) {
+        while (ends_.node != at_node_ || ends_.leaf != at_leaf_) {
             visit_nodes();
             test_leaves();
             finish_and_replace();
@@ -55,6 +43,12 @@ public:
     }
 
 private:
+    // One past the last flight of each queue: flights that wait for the same kind of step stand together, so that
+    // each kind has a loop to itself and no step has to ask.
+    struct Ends {
+        State **node, **leaf, **done;
+    };
+
     // Puts the next ray that can hit anything into a flight's place; rays that can't are answered here.
     void start(State& f) {
         for (;; ++next_) {
@@ -69,58 +63,69 @@ private:
             f.counters.write(hits_, next_);
         }
         f.index = next_++;
-        f.query = Query{f.ray.tmin, f.ray.tmax};
+        f.per_ray = typename Triangles<Isa>::PerRay(f.ray);
+        f.query = query_of<Query>(f.ray, hits_, f.index);
         f.top = Stack::Top(f.stack);
         f.top.child() = inner_child(0);  // the root
-        at_node_.add_if(true, &f);
+        *ends_.node++ = &f;
     }
 
-    // The child on top is next: prefetched now, and waited for in the right place.
-    [[gnu::always_inline]] void wait(State& f) {
+    // The child on top is next: prefetched now, and waited for in the right queue. Written to all three, and counted
+    // in one: no branch.
+    [[gnu::always_inline]] static void wait(const BvhView& bvh, State& f, Stack::Top top, Ends& ends) {
         if constexpr (Query::in_order)
-            while (f.top.distance() > f.query.tmax) f.top.move(-1);
-        const std::uint32_t child = f.top.child();
-        prefetch(bvh_, child);
+            while (top.distance() > f.query.tmax) top.move(-1);
+        f.top = top;
+        const std::uint32_t child = top.child();
+        prefetch(bvh, child);
         const bool inner = is_inner(child), end = child == end_of_stack;
-        at_node_.add_if(inner, &f);
-        at_leaf_.add_if(!inner & !end, &f);
-        done_.add_if(end, &f);
+        *ends.node = *ends.leaf = *ends.done = &f;
+        ends.node += inner;
+        ends.leaf += !inner & !end;
+        ends.done += end;
     }
 
     [[gnu::always_inline]] void visit_nodes() {
-        const unsigned count = at_node_.count;
-        at_node_.count = 0;  // refilled from the front, never past the flight at hand
-        for (unsigned i = 0; i < count; ++i) {
-            State& f = *at_node_.flights[i];
+        const BvhView bvh = bvh_;
+        State** const last = ends_.node;
+        Ends ends = {at_node_, ends_.leaf, ends_.done};  // refilled from the front, never past the flight at hand
+        for (State** i = at_node_; i != last; ++i) {
+            State& f = **i;
+            Stack::Top top = f.top;
             f.counters.inner_node();
-            visit<Query::in_order>(bvh_.node(f.top.child()), Slabs<Isa>(f.ray), f.query.tmax, f.top);
-            wait(f);
+            visit<Query::in_order>(bvh.node(top.child()), Slabs<Isa>(f.ray), f.query.tmax, top);
+            wait(bvh, f, top, ends);
         }
+        ends_ = ends;
     }
 
     [[gnu::always_inline]] void test_leaves() {
-        const unsigned count = at_leaf_.count;
-        at_leaf_.count = 0;
-        for (unsigned i = 0; i < count; ++i) {
-            State& f = *at_leaf_.flights[i];
-            const std::uint32_t child = f.top.child();
+        const BvhView bvh = bvh_;
+        State** const last = ends_.leaf;
+        Ends ends = {ends_.node, at_leaf_, ends_.done};
+        for (State** i = at_leaf_; i != last; ++i) {
+            State& f = **i;
+            Stack::Top top = f.top;
+            const std::uint32_t child = top.child();
             f.counters.leaf();
-            const bool finished =
-                test_leaf(bvh_.leaf(child), leaf_block_count(child), Triangles<Isa>(f.ray), f.query, f.counters);
-            if (finished) f.top = Stack::Top(f.stack);
-            f.top.move(-1);
-            wait(f);
+            const bool finished = test_leaf(bvh.leaf(child), leaf_block_count(child),
+                                            Triangles<Isa>(f.ray, f.per_ray), f.query, f.counters);
+            if (finished) top = Stack::Top(f.stack);
+            top.move(-1);
+            wait(bvh, f, top, ends);
         }
+        ends_ = ends;
     }
 
     [[gnu::always_inline]] void finish_and_replace() {
-        for (unsigned i = 0; i < done_.count; ++i) {
-            State& f = *done_.flights[i];
+        State** const last = ends_.done;
+        ends_.done = done_;
+        for (State** i = done_; i != last; ++i) {
+            State& f = **i;
             f.query.write(hits_, f.index, f.ray.scale);
             f.counters.write(hits_, f.index);
             start(f);
         }
-        done_.count = 0;
     }
 
     const BvhView bvh_;
@@ -128,7 +133,8 @@ private:
     const HitBatch hits_;
     const RaySource source_;
     State* flights_;
-    Waiting<State> at_node_, at_leaf_, done_;
+    State *at_node_[max_in_flight + 1], *at_leaf_[max_in_flight + 1], *done_[max_in_flight + 1];
+    Ends ends_ = {at_node_, at_leaf_, done_};
     std::size_t next_ = 0, end_ = 0;
 };
 

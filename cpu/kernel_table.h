@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <tuple>
 #include <type_traits>
 #include <utility>
 
@@ -15,22 +16,23 @@ namespace wive {
 template <class Isa, template <class> class Slabs>
 struct KernelMaker {
     template <QueryKind kind>
-    using Query = std::conditional_t<kind == QueryKind::closest, ClosestHit, AnyHit>;
+    using Query = std::tuple_element_t<static_cast<std::size_t>(kind), std::tuple<ClosestHit, AnyHit, AllHits, CountHits>>;
 
-    template <KernelChoice choice>
-    static constexpr TraceBatch kernel() {
+    template <KernelChoice choice, template <class> class Triangles>
+    struct Made {
         using Counters = std::conditional_t<choice.counting, StepCounters, NoCounters>;
-        if constexpr (choice.accuracy == Accuracy::fast)
-            return trace_batch<Isa, Slabs, FastTriangles, Query<choice.query>, Counters>;
-        else
-            return trace_batch<Isa, Slabs, WatertightTriangles, Query<choice.query>, Counters>;
-    }
+        static constexpr TraceBatch kernel = trace_batch<Isa, Slabs, Triangles, Query<choice.query>, Counters>;
+        static constexpr std::size_t flight_bytes = sizeof(Flight<Isa, Triangles, Query<choice.query>, Counters>);
+    };
+    template <KernelChoice choice>
+    using Maker = std::conditional_t<choice.accuracy == Accuracy::fast, Made<choice, FastTriangles>,
+                                     Made<choice, WatertightTriangles>>;
 
     template <std::size_t... index>
     static constexpr KernelTable table(std::string_view name, std::index_sequence<index...>) {
         return {name,
-                std::max({sizeof(Flight<Isa, Query<kernel_choice(index).query>, StepCounters>)...}),
-                {kernel<kernel_choice(index)>()...}};
+                std::max({Maker<kernel_choice(index)>::flight_bytes...}),
+                {Maker<kernel_choice(index)>::kernel...}};
     }
 };
 

@@ -9,8 +9,8 @@
 
 namespace wive {
 
-enum class QueryKind { closest, any };
-inline constexpr int query_count = 2;
+enum class QueryKind { closest, any, all, count };
+inline constexpr int query_count = 4;
 
 // What a kernel is made for; each holds the code of exactly that.
 struct KernelChoice {

@@ -7,10 +7,14 @@
 
 namespace wive {
 
+// Every query has in_order: whether children are met from front to back, and crossings: whether the number of its
+// hits matters, so that a ray must not pass a surface twice where two triangles meet.
+
 // The nearest hit in [tmin, tmax]; of hits at the same t, the lowest prim, whatever order they are found in.
 struct ClosestHit {
     // Children are met from front to back and kept with their distances, because tmax falls with every hit found.
     static constexpr bool in_order = true;
+    static constexpr bool crossings = false;
 
     float tmin, tmax;  // tmax shrinks to the best hit
     float u = 0, v = 0;
@@ -41,6 +45,7 @@ struct ClosestHit {
 struct AnyHit {
     // Any hit ends the query, so children are taken as they stand: cheaper, and fewer steps as well.
     static constexpr bool in_order = false;
+    static constexpr bool crossings = false;
 
     float tmin, tmax;
     bool hit = false;

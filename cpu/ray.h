@@ -15,6 +15,8 @@ struct RayBatch {
     std::size_t tmin_stride, tmax_stride;
 };
 
+class HitList;
+
 // Where results go; a null pointer is an output nobody asked for.
 struct HitBatch {
     float* t = nullptr;            // (n,) infinity on a miss
@@ -22,6 +24,8 @@ struct HitBatch {
     float* uv = nullptr;           // (n, 2) NaN on a miss
     bool* occluded = nullptr;      // (n,) any-hit queries write only this
     std::int32_t* stats = nullptr; // (n, 3) inner nodes, leaves, triangles
+    std::int32_t* count = nullptr; // (n,) hits of each ray, where all are asked for
+    HitList* found = nullptr;      // and the hits themselves: a list for each worker of the batch
 };
 
 // Hands out the rays of a batch, a run at a time, to all the threads that trace it.

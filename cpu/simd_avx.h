@@ -56,10 +56,10 @@ struct SseFloat4 {
     WIVE_INLINE friend unsigned less_equal(SseFloat4 a, SseFloat4 b) {
         return static_cast<unsigned>(_mm_movemask_ps(_mm_cmp_ps(a.v, b.v, _CMP_LE_OQ)));
     }
-    // Lanes where a <= b, c <= d and e <= f.
-    WIVE_INLINE friend unsigned all_less_equal(SseFloat4 a, SseFloat4 b, SseFloat4 c, SseFloat4 d, SseFloat4 e, SseFloat4 f) {
+    // Lanes where a <= b, c <= d and e < f.
+    WIVE_INLINE friend unsigned all_in_order(SseFloat4 a, SseFloat4 b, SseFloat4 c, SseFloat4 d, SseFloat4 e, SseFloat4 f) {
         const __m128 ab = _mm_cmp_ps(a.v, b.v, _CMP_LE_OQ), cd = _mm_cmp_ps(c.v, d.v, _CMP_LE_OQ);
-        return static_cast<unsigned>(_mm_movemask_ps(_mm_and_ps(_mm_and_ps(ab, cd), _mm_cmp_ps(e.v, f.v, _CMP_LE_OQ))));
+        return static_cast<unsigned>(_mm_movemask_ps(_mm_and_ps(_mm_and_ps(ab, cd), _mm_cmp_ps(e.v, f.v, _CMP_LT_OQ))));
     }
     WIVE_INLINE friend unsigned equal(SseFloat4 a, SseFloat4 b) {
         return static_cast<unsigned>(_mm_movemask_ps(_mm_cmp_ps(a.v, b.v, _CMP_EQ_OQ)));
@@ -78,6 +78,8 @@ struct AvxHits {
     WIVE_INLINE unsigned count() const {
         return static_cast<unsigned>(_mm_popcnt_u32(static_cast<unsigned>(_mm256_movemask_ps(v))));
     }
+    // The lowest lane, of at least one.
+    WIVE_INLINE unsigned first() const { return _tzcnt_u32(static_cast<unsigned>(_mm256_movemask_ps(v))); }
 };
 
 struct AvxFloat8 {

@@ -74,9 +74,12 @@ struct ScalarLanes {
         for (int i = 0; i < width; ++i) bits |= static_cast<unsigned>(a.v[i] <= b.v[i]) << i;
         return bits;
     }
-    WIVE_INLINE friend unsigned all_less_equal(ScalarLanes a, ScalarLanes b, ScalarLanes c, ScalarLanes d, ScalarLanes e,
-                                               ScalarLanes f) {
-        return less_equal(a, b) & less_equal(c, d) & less_equal(e, f);
+    WIVE_INLINE friend unsigned all_in_order(ScalarLanes a, ScalarLanes b, ScalarLanes c, ScalarLanes d, ScalarLanes e,
+                                             ScalarLanes f) {
+        unsigned bits = 0;
+        for (int i = 0; i < width; ++i)
+            bits |= static_cast<unsigned>(a.v[i] <= b.v[i] && c.v[i] <= d.v[i] && e.v[i] < f.v[i]) << i;
+        return bits;
     }
     WIVE_INLINE friend unsigned equal(ScalarLanes a, ScalarLanes b) {
         unsigned bits = 0;
@@ -100,6 +103,7 @@ struct ScalarLanes {
 struct ScalarHits {
     unsigned mask;
     WIVE_INLINE unsigned count() const { return static_cast<unsigned>(__builtin_popcount(mask)); }
+    WIVE_INLINE unsigned first() const { return static_cast<unsigned>(__builtin_ctz(mask)); }
 };
 WIVE_INLINE ScalarHits hits(const ScalarLanes<float, 8>& tnear, const ScalarLanes<float, 8>& tfar) {
     return {less_equal(tnear, tfar)};

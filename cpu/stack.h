@@ -13,18 +13,19 @@ namespace wive {
 //
 // `top` points at the distance of the entry that was taken last; what a node pushes overwrites it. An entry's child
 // stands a fixed way behind its distance. Below all others is an entry that is always near enough to be taken, and
-// whose child ends the traversal. It stands there twice, so that one may look at the entry below the top of an
+// whose child ends the traversal. It stands there several times, so that one may look at entries below the top of an
 // empty stack.
 struct alignas(64) Stack {
-    static constexpr std::ptrdiff_t size = (3 + max_stack + node_width + 15) / 16 * 16;
+    static constexpr std::ptrdiff_t lowest = 3;  // entries that end the traversal
+    static constexpr std::ptrdiff_t size = (1 + lowest + max_stack + node_width + 15) / 16 * 16;
     float distances[size];
     std::uint32_t children[size];
 
     class Top {
     public:
         Top() = default;
-        [[gnu::always_inline]] explicit Top(Stack& stack) : distance_(stack.distances + 2) {
-            for (int i = 0; i < 2; ++i) {
+        [[gnu::always_inline]] explicit Top(Stack& stack) : distance_(stack.distances + lowest) {
+            for (int i = 0; i < lowest; ++i) {
                 stack.distances[i] = -std::numeric_limits<float>::infinity();
                 stack.children[i] = end_of_stack;
             }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "hit_list.h"
 #include "large_array.h"
 #include "parallel.h"
 
@@ -17,6 +18,11 @@ constexpr std::size_t fewest_in_flight = 16;
 
 }  // namespace
 
+unsigned worker_count(std::size_t count, unsigned threads) {
+    const std::size_t runs = (count + rays_per_run - 1) / rays_per_run;
+    return runs <= 1 ? 1 : static_cast<unsigned>(std::min<std::size_t>(runs, thread_count(threads)));
+}
+
 void trace(const KernelTable& table, TraceBatch kernel, const BvhView& bvh, const RayBatch& rays, const HitBatch& hits,
            std::size_t count, unsigned threads, unsigned in_flight) {
     if (in_flight == 0) in_flight = count < fewest_in_flight ? 1 : usual_in_flight;
@@ -24,12 +30,13 @@ void trace(const KernelTable& table, TraceBatch kernel, const BvhView& bvh, cons
     in_flight = static_cast<unsigned>(std::min<std::size_t>(in_flight, count));
     std::size_t next = 0;
     const RaySource source = {&next, count, rays_per_run};
-    const auto work = [&](std::size_t) {
+    const auto work = [&](std::size_t worker) {
         LargeArray<std::byte> scratch(in_flight > 1 ? in_flight * table.flight_bytes : 0);
-        kernel(bvh, rays, hits, source, in_flight, scratch.data());
+        HitBatch own = hits;
+        if (own.found) own.found += worker;
+        kernel(bvh, rays, own, source, in_flight, scratch.data());
     };
-    const std::size_t runs = (count + rays_per_run - 1) / rays_per_run;
-    const unsigned workers = runs <= 1 ? 1 : static_cast<unsigned>(std::min<std::size_t>(runs, thread_count(threads)));
+    const unsigned workers = worker_count(count, threads);
     parallel_for(workers, workers, work);
 }
 

@@ -11,7 +11,13 @@ class FastTriangles {
     using Float4 = typename Isa::Float4;
 
 public:
-    [[gnu::always_inline]] explicit FastTriangles(const RayFrame<Isa>& ray) {
+    // What leaves need of a ray beyond its frame: nothing.
+    struct PerRay {
+        PerRay() = default;
+        [[gnu::always_inline]] explicit PerRay(const RayFrame<Isa>&) {}
+    };
+
+    [[gnu::always_inline]] FastTriangles(const RayFrame<Isa>& ray, const PerRay&) {
         for (int axis = 0; axis < 3; ++axis) {
             origin_[axis] = Float4::all(ray.origin[axis]);
             direction_[axis] = Float4::all(ray.direction[axis]);
@@ -29,9 +35,9 @@ public:
         cross(s, e1, q);
         const Float4 det = dot(e1, p), size = abs(det), zero = Float4::all(0.0f);
         const Float4 u = flip_sign(dot(s, p), det), v = flip_sign(dot(direction_, q), det);
-        // A determinant of zero (a ray in the triangle's plane) and NaN (an unused lane) must fail: size <= 0 is
-        // asked the other way round.
-        unsigned lanes = less_equal(zero, u) & less_equal(zero, v) & less_equal(u + v, size) & ~less_equal(size, zero);
+        // A determinant of zero (a ray in the triangle's plane) fails, and so does NaN (an unused lane): where u is
+        // NaN and v is not, min gives v, but the sum is NaN.
+        unsigned lanes = all_in_order(zero, min(u, v), u + v, size, zero, size);
         if (lanes == 0) [[likely]] return false;
         alignas(16) float ts[4], us[4], vs[4];
         for (Float4& component : q) component = component / size;  // first: the product of three lengths may overflow

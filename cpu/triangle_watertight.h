@@ -20,12 +20,24 @@ class WatertightTriangles {
     using Double4 = typename Isa::Double4;
 
 public:
-    [[gnu::always_inline]] explicit WatertightTriangles(const RayFrame<Isa>& ray) : ray_(ray) {
-        constexpr unsigned following = 0b001001;  // the axis after axis i, two bits each
-        axis_[2] = ray.longest_axis;
-        axis_[0] = following >> 2 * axis_[2] & 3u;
-        axis_[1] = following >> 2 * axis_[0] & 3u;
-        for (int k = 0; k < 2; ++k) shear_[k] = ray.direction[axis_[k]] / ray.direction[axis_[2]];
+    // What leaves need of a ray beyond its frame: its axes, the longest last, and the shear that makes it the z axis.
+    struct PerRay {
+        std::uint32_t axis[3];
+        float shear[2];
+
+        PerRay() = default;
+        [[gnu::always_inline]] explicit PerRay(const RayFrame<Isa>& ray) {
+            constexpr unsigned following = 0b001001;  // the axis after axis i, two bits each
+            axis[2] = ray.longest_axis;
+            axis[0] = following >> 2 * axis[2] & 3u;
+            axis[1] = following >> 2 * axis[0] & 3u;
+            for (int k = 0; k < 2; ++k) shear[k] = ray.direction[axis[k]] / ray.direction[axis[2]];
+        }
+    };
+
+    [[gnu::always_inline]] WatertightTriangles(const RayFrame<Isa>& ray, const PerRay& per_ray) : ray_(ray) {
+        for (int k = 0; k < 3; ++k) axis_[k] = per_ray.axis[k];
+        for (int k = 0; k < 2; ++k) shear_[k] = per_ray.shear[k];
         for (int k = 0; k < 3; ++k) origin_[k] = Float4::all(ray.origin[axis_[k]]);
     }
 

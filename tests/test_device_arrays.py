@@ -108,6 +108,45 @@ def test_occluded_comes_back_in_the_library_of_the_rays(scene, library):
     np.testing.assert_array_equal(blocked, scene.occluded(*RAYS, 0.25, 0.75))
 
 
+def test_all_hits_come_back_in_the_library_of_the_rays(scene, library):
+    expected, counted = scene.intersect_all(*RAYS, stats=True)
+    hits, stats = scene.intersect_all(*map(library.make, RAYS), stats=True)
+    assert len(hits) == 777
+    assert "777 rays" in repr(hits) and f"{len(expected.t)} hits" in repr(hits)
+    # JAX has neither int64 nor float64 unless it is told to (jax_enable_x64).
+    exact = library.name != "jax"
+    for name in ("offsets", "t", "prim", "uv", "counts", "ray"):
+        found, wanted = library.read(getattr(hits, name)), getattr(expected, name)
+        assert found.shape == wanted.shape
+        assert found.dtype == wanted.dtype or (wanted.dtype == np.int64 and not exact)
+        np.testing.assert_array_equal(found, wanted)
+    for name in ("points", "normals"):
+        found, wanted = library.read(getattr(hits, name)()), getattr(expected, name)()
+        np.testing.assert_allclose(found, wanted, rtol=1e-14 if exact else 1e-6)
+    for found, wanted in zip(stats, counted, strict=True):
+        np.testing.assert_array_equal(library.read(found), wanted)
+
+
+def test_counts_come_back_in_the_library_of_the_rays(scene, library):
+    counts = library.read(scene.count(*map(library.make, RAYS), 0.25, 0.75))
+    assert counts.dtype == np.int32
+    np.testing.assert_array_equal(counts, scene.count(*RAYS, 0.25, 0.75))
+
+
+def test_hits_of_one_ray_are_in_the_library_of_the_rays(scene, library):
+    expected = scene.intersect_all(*RAYS)
+    hits = scene.intersect_all(*map(library.make, RAYS))
+    most, none = int(expected.counts.argmax()), int(expected.counts.argmin())
+    for i in (most, none, -1):
+        mine = hits[i]
+        assert len(mine) == 1
+        np.testing.assert_array_equal(library.read(mine.t), expected[i].t)
+        np.testing.assert_array_equal(library.read(mine.offsets), expected[i].offsets)
+        assert library.read(mine.points()).shape == expected[i].points().shape
+    with pytest.raises(IndexError, match="ray 777 of 777: count from 0 to 776"):
+        hits[777]
+
+
 def test_limits_may_be_numbers_or_arrays_of_the_library(scene, library):
     limits = np.random.default_rng(3).uniform(0, 0.7, (2, 777)).astype(np.float32)
     expected = scene.intersect(*RAYS, *limits)
@@ -134,6 +173,10 @@ def test_no_rays_give_no_hits_in_any_library(scene, library):
     assert library.read(hits.uv).shape == (0, 2)
     assert library.read(hits.points()).shape == (0, 3)
     assert library.read(scene.occluded(library.make(none), library.make(none))).shape == (0,)
+    assert library.read(scene.count(library.make(none), library.make(none))).shape == (0,)
+    every = scene.intersect_all(library.make(none), library.make(none))
+    np.testing.assert_array_equal(library.read(every.offsets), [0])
+    assert library.read(every.uv).shape == (0, 2)
 
 
 def test_strided_rays_are_read_where_they_lie(scene, library):

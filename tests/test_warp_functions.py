@@ -44,6 +44,29 @@ def trace_fast(
     occluded[i] = warp_kernels.any_hit(bvh, origins[i], directions[i], 0.0, wp.inf)
 
 
+@wp.kernel
+def count_watertight(
+    bvh: warp_kernels.Bvh,
+    origins: wp.array(dtype=wp.vec3),
+    directions: wp.array(dtype=wp.vec3),
+    counts: wp.array(dtype=wp.int32),
+):
+    i = wp.tid()
+    counts[i] = warp_kernels.count_hits(bvh, origins[i], directions[i], 0.25, 1.5)
+
+
+@wp.kernel
+def count_fast(
+    bvh: warp_kernels.FastBvh,
+    origins: wp.array(dtype=wp.vec3),
+    directions: wp.array(dtype=wp.vec3),
+    counts: wp.array(dtype=wp.int32),
+):
+    i = wp.tid()
+    counts[i] = warp_kernels.count_hits(bvh, origins[i], directions[i], 0.25, 1.5)
+
+
+COUNTERS = {"watertight": count_watertight, "fast": count_fast}
 KERNELS = {"watertight": trace_watertight, "fast": trace_fast}
 
 
@@ -55,7 +78,7 @@ def trace(kernel: wp.Kernel, tree: warp_kernels.Tree, rays: tuple[np.ndarray, np
     found = hits.numpy()
     uv = np.stack([found["u"], found["v"]], axis=1)
     none = np.zeros((len(found), 3), np.int32)
-    return Answers(found["t"], found["prim"], uv, occluded.numpy(), none, none)
+    return Answers(found["t"], found["prim"], uv, occluded.numpy(), *[none] * 8)
 
 
 @pytest.mark.parametrize("accuracy", KERNELS)
@@ -69,6 +92,20 @@ def test_functions_in_a_users_kernel_give_the_bits_of_the_core(accuracy: str) ->
     assert_bit_identical(
         found, cpu_answers(bvh, "scalar", *rays, ZERO, INFINITE), ("t", "prim", "uv", "occluded")
     )
+
+
+@pytest.mark.parametrize("accuracy", COUNTERS)
+def test_hits_counted_in_a_users_kernel_are_those_of_the_core(accuracy: str) -> None:
+    bvh = _cpu.Bvh(*soup(3000, 1), accuracy)
+    rays = random_rays(2000, 2, 0.0, 1.0)
+    expected, _ = bvh.count("scalar", *rays, np.float32([0.25]), np.float32([1.5]))
+    tree = warp_kernels.upload(bvh, "cpu")
+    counts = wp.zeros(2000, dtype=wp.int32, device="cpu")
+    vectors = [wp.array(a, dtype=wp.vec3, device="cpu") for a in rays]
+    wp.launch(COUNTERS[accuracy], 2000, inputs=[tree.handle, *vectors, counts], device="cpu")
+    warp_kernels.check(tree)
+    assert expected.max() > 5
+    np.testing.assert_array_equal(counts.numpy(), expected)
 
 
 def test_handle_of_the_wrong_accuracy_is_an_error_and_misses() -> None:

@@ -13,6 +13,7 @@ pytestmark = pytest.mark.timeout(60)
 
 
 def launch_all(tree: warp_kernels.Tree, lanes: warp_kernels.launch.Lanes) -> np.ndarray:
+    """Every query; the closest hits, or -1 for a ray for which any of them found nothing."""
     origins, directions = random_rays(64, 1, -0.5, 0.5)
     rays = [wp.array(a, dtype=wp.vec3, device="cpu") for a in (origins, directions)]
     rays += [wp.zeros(1, dtype=wp.float32, device="cpu"), wp.full(1, 1e30, dtype=wp.float32, device="cpu")]
@@ -20,7 +21,10 @@ def launch_all(tree: warp_kernels.Tree, lanes: warp_kernels.launch.Lanes) -> np.
     warp_kernels.launch_closest(tree, *rays, t, prim, None, lanes=lanes)
     occluded = wp.zeros(64, dtype=wp.bool, device="cpu")
     warp_kernels.launch_any(tree, *rays, occluded, lanes=lanes)
-    return prim.numpy()
+    counts = wp.zeros(64, dtype=wp.int32, device="cpu")
+    warp_kernels.launch_count(tree, *rays, counts, lanes=lanes)
+    found = occluded.numpy() & (counts.numpy() > 0)
+    return np.where(found, prim.numpy(), -1)
 
 
 def corrupt(tree: warp_kernels.Tree, child: int) -> None:
@@ -44,6 +48,26 @@ def test_corrupt_tree_raises_instead_of_hanging(
         warp_kernels.check(tree)
     # Later rays give up at once, and miss.
     assert (launch_all(tree, lanes) == -1).all()
+
+
+@pytest.mark.parametrize("lanes", [8, 1])
+def test_hits_that_were_counted_but_are_no_longer_found_are_misses(
+    lanes: warp_kernels.launch.Lanes,
+) -> None:
+    tree = warp_kernels.upload(_cpu.Bvh(*sphere(2)), "cpu")
+    origins, directions = random_rays(64, 1, -0.5, 0.5)
+    rays = [wp.array(a, dtype=wp.vec3, device="cpu") for a in (origins, directions)]
+    rays += [wp.zeros(1, dtype=wp.float32, device="cpu"), wp.full(1, 1e30, dtype=wp.float32, device="cpu")]
+    counts = wp.zeros(64, dtype=wp.int32, device="cpu")
+    warp_kernels.launch_count(tree, *rays, counts, lanes=lanes)
+    promised = wp.array(np.where(np.arange(64) % 2, 0, 3).astype(np.int32), device="cpu")  # one is found
+    offsets = warp_kernels.scan_counts(promised)
+    listed = [wp.zeros(96, dtype=dtype, device="cpu") for dtype in (wp.float32, wp.int32, wp.vec2)]
+    warp_kernels.launch_all(tree, *rays, promised, offsets, *listed, lanes=lanes)
+    np.testing.assert_array_equal(counts.numpy(), 1)
+    prim = listed[1].numpy().reshape(32, 3)
+    assert (prim[:, 0] >= 0).all() and (prim[:, 1:] == -1).all()
+    assert np.isinf(listed[0].numpy().reshape(32, 3)[:, 1:]).all()
 
 
 def test_block_size_that_splits_a_ray_is_refused() -> None:

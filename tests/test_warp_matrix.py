@@ -14,7 +14,7 @@ from wive import _cpu
 
 pytestmark = pytest.mark.timeout(120)
 
-HITS = ("t", "prim", "uv", "occluded")
+HITS = ("t", "prim", "uv", "occluded", "counts", "offsets", "all_t", "all_prim", "all_uv")
 CPU_KERNELS = [name for name, reason in _cpu.kernels().items() if not reason and "." not in name]
 ACCURACIES = ("fast", "watertight")
 Mesh = tuple[np.ndarray, np.ndarray]

@@ -1,4 +1,4 @@
-"""Both queries over a batch of rays by a C++ kernel or a Warp lane form, and what it means to agree."""
+"""Every query over a batch of rays by a C++ kernel or a Warp lane form, and what it means to agree."""
 
 import dataclasses
 from collections.abc import Sequence
@@ -17,7 +17,7 @@ ZERO = np.zeros(1, np.float32)
 
 @dataclasses.dataclass(frozen=True)
 class Answers:
-    """What both queries wrote, and how many steps each took."""
+    """What each query wrote, and how many steps it took."""
 
     t: np.ndarray
     prim: np.ndarray
@@ -25,6 +25,12 @@ class Answers:
     occluded: np.ndarray
     steps: np.ndarray  # (n, 3) of the closest hit
     any_steps: np.ndarray
+    counts: np.ndarray
+    count_steps: np.ndarray
+    offsets: np.ndarray  # of all hits, as the three below
+    all_t: np.ndarray
+    all_prim: np.ndarray
+    all_uv: np.ndarray
 
 
 def cpu_answers(
@@ -39,7 +45,10 @@ def cpu_answers(
     t, prim, uv, steps = bvh.intersect(kernel, *rays, threads=1, in_flight=1, stats=True)
     occluded, any_steps = bvh.occluded(kernel, *rays, threads=1, in_flight=1, stats=True)
     assert steps is not None and any_steps is not None
-    return Answers(t, prim, uv, occluded, steps, any_steps)
+    counts, count_steps = bvh.count(kernel, *rays, threads=1, in_flight=1, stats=True)
+    assert count_steps is not None
+    *listed, _ = bvh.intersect_all(kernel, *rays, threads=1)
+    return Answers(t, prim, uv, occluded, steps, any_steps, counts, count_steps, *listed)
 
 
 def warp_answers(
@@ -66,11 +75,20 @@ def warp_answers(
         wp.zeros(count, dtype=wp.vec2, device=device),
         wp.zeros(count, dtype=wp.bool, device=device),
     )
-    steps = [wp.zeros(count, dtype=wp.vec3i, device=device) for _ in range(2)]
+    counts = wp.zeros(count, dtype=wp.int32, device=device)
+    steps = [wp.zeros(count, dtype=wp.vec3i, device=device) for _ in range(3)]
     warp_kernels.launch_closest(tree, *rays, t, prim, uv, stats=steps[0], lanes=lanes, block_dim=block_dim)
     warp_kernels.launch_any(tree, *rays, occluded, stats=steps[1], lanes=lanes, block_dim=block_dim)
+    warp_kernels.launch_count(tree, *rays, counts, stats=steps[2], lanes=lanes, block_dim=block_dim)
+    offsets = warp_kernels.scan_counts(counts)
+    total = int(offsets.numpy()[-1])
+    listed = [wp.zeros(total, dtype=dtype, device=device) for dtype in (wp.float32, wp.int32, wp.vec2)]
+    left = wp.clone(counts)
+    warp_kernels.launch_all(tree, *rays, left, offsets, *listed, lanes=lanes, block_dim=block_dim)
     warp_kernels.check(tree)
-    return Answers(*(array.numpy() for array in (t, prim, uv, occluded, *steps)))
+    assert not left.numpy().any()
+    written = (t, prim, uv, occluded, steps[0], steps[1], counts, steps[2], offsets, *listed)
+    return Answers(*(array.numpy() for array in written))
 
 
 def assert_bit_identical(one: Answers, other: Answers, fields: Sequence[str] | None = None) -> None:

@@ -5,6 +5,8 @@ Launches over batches of rays (what `wive.Scene` uses):
     tree = upload(bvh, device)                 # bvh: wive._cpu.Bvh, device: "cpu", "cuda:0", ...
     launch_closest(tree, origins, directions, tmin, tmax, t, prim, uv)
     launch_any(tree, origins, directions, tmin, tmax, occluded)
+    launch_count(tree, origins, directions, tmin, tmax, counts)
+    offsets = scan_counts(counts)              # then launch_all lists the hits
     check(tree)                                # waits; raises where a kernel met a corrupt tree
 
 Functions for users' own kernels take `tree.handle`, whose type says the accuracy: `Bvh` for watertight trees,
@@ -19,13 +21,15 @@ Functions for users' own kernels take `tree.handle`, whose type says the accurac
 Hits are those of the C++ backends, bit for bit: t is infinity, prim -1 and u, v NaN where a ray misses.
 """
 
-from wive.warp_kernels.functions import any_hit, closest_hit
+from wive.warp_kernels.functions import any_hit, closest_hit, count_hits
 from wive.warp_kernels.gradients import SurfaceHit, differentiable_hit
 from wive.warp_kernels.handle import Bvh, FastBvh, Hit
 from wive.warp_kernels.launch import launch_any, launch_closest
+from wive.warp_kernels.launch_all import MOST_HITS, launch_all, launch_count, scan_counts
 from wive.warp_kernels.tree import CorruptTreeError, Tree, check, upload
 
 __all__ = [
+    "MOST_HITS",
     "Bvh",
     "CorruptTreeError",
     "FastBvh",
@@ -35,8 +39,12 @@ __all__ = [
     "any_hit",
     "check",
     "closest_hit",
+    "count_hits",
     "differentiable_hit",
+    "launch_all",
     "launch_any",
     "launch_closest",
+    "launch_count",
+    "scan_counts",
     "upload",
 ]

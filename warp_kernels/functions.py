@@ -20,6 +20,8 @@ _closest_watertight = make_traversal("closest", "watertight", 8, STACK, False)
 _closest_fast = make_traversal("closest", "fast", 8, STACK, False)
 _any_watertight = make_traversal("any", "watertight", 8, STACK, False)
 _any_fast = make_traversal("any", "fast", 8, STACK, False)
+_count_watertight = make_traversal("count", "watertight", 8, STACK, False)
+_count_fast = make_traversal("count", "fast", 8, STACK, False)
 
 
 @wp.func
@@ -102,6 +104,29 @@ def any_hit(bvh: FastBvh, origin: wp.vec3, direction: wp.vec3, tmin: float, tmax
     return hit
 
 
+@wp.func
+def count_hits(bvh: Bvh, origin: wp.vec3, direction: wp.vec3, tmin: float, tmax: float) -> int:
+    """How many triangles the ray meets within the closed interval [tmin, tmax], as `wive.Scene.count`.
+
+    It takes the handle of a watertight tree (`Bvh`) or of a fast one (`FastBvh`). It has no gradients.
+    """
+    ray = load_frame(bvh.center, bvh.extent, origin, direction, tmin, tmax)
+    count = int(0)  # noqa: RUF046, UP018
+    if ray.valid and not _refused(bvh.error, bvh.stack, bvh.watertight == 0):
+        count = _count_watertight(bvh, ray, 0).best.count
+    return count
+
+
+@wp.func
+def count_hits(bvh: FastBvh, origin: wp.vec3, direction: wp.vec3, tmin: float, tmax: float) -> int:  # noqa: F811
+    """How many triangles the ray meets in a fast tree."""
+    ray = load_frame(bvh.center, bvh.extent, origin, direction, tmin, tmax)
+    count = int(0)  # noqa: RUF046, UP018
+    if ray.valid and not _refused(bvh.error, bvh.stack, bvh.watertight != 0):
+        count = _count_fast(bvh, ray, 0).best.count
+    return count
+
+
 # Which triangle is hit does not change smoothly with anything: no gradient passes through the traversal.
 
 
@@ -129,5 +154,19 @@ def _no_gradient_of_any(
 @wp.func_grad(any_hit)
 def _no_gradient_of_any_fast(
     bvh: FastBvh, origin: wp.vec3, direction: wp.vec3, tmin: float, tmax: float, adj_ret: bool
+):
+    pass
+
+
+@wp.func_grad(count_hits)
+def _no_gradient_of_count(
+    bvh: Bvh, origin: wp.vec3, direction: wp.vec3, tmin: float, tmax: float, adj_ret: int
+):
+    pass
+
+
+@wp.func_grad(count_hits)
+def _no_gradient_of_count_fast(
+    bvh: FastBvh, origin: wp.vec3, direction: wp.vec3, tmin: float, tmax: float, adj_ret: int
 ):
     pass

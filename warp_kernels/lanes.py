@@ -15,6 +15,7 @@ from types import SimpleNamespace
 import warp as wp
 
 from wive.warp_kernels.native import (
+    ADD_REDUCE,
     DISTANCES_1,
     DISTANCES_8,
     MIN_REDUCE,
@@ -91,6 +92,10 @@ def _or_of_group(x: wp.uint32) -> wp.uint32: ...
 def _min_of_group(x: wp.uint32) -> wp.uint32: ...
 
 
+@wp.func_native(ADD_REDUCE)
+def _sum_of_group(x: wp.uint32) -> wp.uint32: ...
+
+
 @wp.func
 def _nothing():
     pass
@@ -103,6 +108,11 @@ def _sync_group(): ...
 def reductions(length: int) -> tuple[wp.Function, wp.Function]:
     """The or and the minimum of what each thread of a ray holds, the same for all of them."""
     return (_same, _same) if length == 8 else (_or_of_group, _min_of_group)
+
+
+def sum_reduction(length: int) -> wp.Function:
+    """The sum of what each thread of a ray holds, the same for all of them."""
+    return _same if length == 8 else _sum_of_group
 
 
 @functools.cache

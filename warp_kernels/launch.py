@@ -55,7 +55,7 @@ def launch_closest(
         stream: the CUDA stream to launch on; None is the device's current one.
     """
     kernel = closest_kernel(tree.accuracy, lanes, tree.stack, stats is not None)
-    _launch(kernel, tree, [origins, directions, tmin, tmax], [t, prim, uv, stats], lanes, block_dim, stream)
+    launch(kernel, tree, [origins, directions, tmin, tmax], [t, prim, uv, stats], lanes, block_dim, stream)
 
 
 def launch_any(
@@ -76,10 +76,10 @@ def launch_any(
     The other arguments are those of `launch_closest`.
     """
     kernel = any_kernel(tree.accuracy, lanes, tree.stack, stats is not None)
-    _launch(kernel, tree, [origins, directions, tmin, tmax], [occluded, stats], lanes, block_dim, stream)
+    launch(kernel, tree, [origins, directions, tmin, tmax], [occluded, stats], lanes, block_dim, stream)
 
 
-def _launch(
+def launch(
     kernel: wp.Kernel,
     tree: Tree,
     rays: list[wp.array[Any]],
@@ -88,6 +88,7 @@ def _launch(
     block_dim: int | None,
     stream: wp.Stream | None,
 ) -> None:
+    """Launch a kernel over rays: origins, directions, tmin, tmax; a null output is one nobody asked for."""
     count = len(rays[0])
     if count == 0:
         return

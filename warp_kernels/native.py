@@ -39,6 +39,7 @@ def _reduce(cuda: str, combine: str) -> str:
 
 OR_REDUCE = _reduce("__reduce_or_sync", "all | y")
 MIN_REDUCE = _reduce("__reduce_min_sync", "y < all ? y : all")
+ADD_REDUCE = _reduce("__reduce_add_sync", "all + y")
 
 SYNC = f"""
 #if defined(__CUDA_ARCH__)
@@ -124,6 +125,24 @@ PRODUCTS = """
     for (int i = 0; i < LENGTH; ++i) c[i] = a[i] * b[i];
 #endif
     return c;
+"""
+
+# A hit goes to the last free place of its ray's, and the number of those falls. It does not fall below zero:
+# memory stays whole even where rays were overwritten since their hits were counted. On the CPU device a ray's
+# fibers take turns.
+LIST_HIT = """
+#if defined(__CUDA_ARCH__)
+    const int place = atomicSub((int*)left, 1) - 1;
+    if (place < 0) { atomicAdd((int*)left, 1); return; }
+#else
+    if (*(const int*)left <= 0) return;
+    const int place = --*(int*)left;
+#endif
+    float* hit = (float*)hits + 4 * (wp::int64)place;
+    hit[0] = t;
+    hit[1] = u;
+    hit[2] = v;
+    ((int*)hit)[3] = prim;
 """
 
 

@@ -6,7 +6,9 @@ from types import SimpleNamespace
 # Warp compiles these functions: to mypy they are no Python.
 import warp as wp
 
+from wive.warp_kernels.frame import RayFrame
 from wive.warp_kernels.handle import NO_PRIM
+from wive.warp_kernels.query_all import Crossings, begin_crossings, never_done, offer_all, offer_count
 
 
 @wp.struct
@@ -17,6 +19,15 @@ class Best:
     u: wp.float32
     v: wp.float32
     prim: wp.int32
+
+
+@wp.func
+def begin_best(ray: RayFrame):
+    """Nothing hit yet."""
+    best = Best()
+    best.t = ray.tmax
+    best.prim = wp.static(NO_PRIM)
+    return best
 
 
 @wp.func
@@ -52,8 +63,42 @@ def any_done(best: Best):
 
 
 # in_order: children are met from front to back and kept with their distances, because tmax falls with every
-# hit.
+# hit. one_is_enough: a hit of any thread ends the query. crossings: how many hits there are matters.
 QUERIES = {
-    "closest": SimpleNamespace(in_order=True, offer=offer_closest, done=closest_done),
-    "any": SimpleNamespace(in_order=False, offer=offer_any, done=any_done),
+    "closest": SimpleNamespace(
+        in_order=True,
+        one_is_enough=False,
+        crossings=False,
+        state=Best,
+        begin=begin_best,
+        offer=offer_closest,
+        done=closest_done,
+    ),
+    "any": SimpleNamespace(
+        in_order=False,
+        one_is_enough=True,
+        crossings=False,
+        state=Best,
+        begin=begin_best,
+        offer=offer_any,
+        done=any_done,
+    ),
+    "count": SimpleNamespace(
+        in_order=False,
+        one_is_enough=False,
+        crossings=True,
+        state=Crossings,
+        begin=begin_crossings,
+        offer=offer_count,
+        done=never_done,
+    ),
+    "all": SimpleNamespace(
+        in_order=False,
+        one_is_enough=False,
+        crossings=True,
+        state=Crossings,
+        begin=begin_crossings,
+        offer=offer_all,
+        done=never_done,
+    ),
 }

@@ -21,7 +21,6 @@ from wive.warp_kernels.handle import (
     CORRUPT,
     END_OF_STACK,
     HANDLES,
-    NO_PRIM,
     NODE_WIDTH,
     PRIM_ROW,
     SIGN_BIT,
@@ -29,6 +28,7 @@ from wive.warp_kernels.handle import (
 )
 from wive.warp_kernels.lanes import address_of, lanes_of, load_float, lowest_lane, without_gradient
 from wive.warp_kernels.query import QUERIES, Best
+from wive.warp_kernels.query_all import Crossings
 from wive.warp_kernels.slabs import make_visit
 
 TRIANGLES = {
@@ -43,6 +43,17 @@ class Traversal:
 
     best: Best
     tmax: wp.float32  # the group's
+    inner_nodes: wp.int32
+    leaves: wp.int32
+    triangles: wp.int32
+
+
+@wp.struct
+class Crossed:
+    """The same of a query for everything along the ray."""
+
+    best: Crossings
+    tmax: wp.float32
     inner_nodes: wp.int32
     leaves: wp.int32
     triangles: wp.int32
@@ -65,6 +76,20 @@ def unsortable(key: wp.uint32):
 @functools.cache
 def make_traversal(query: str, accuracy: str, length: int, entries: int, counters: bool) -> wp.Function:
     """The traversal for one query, accuracy and lane form; that many stack entries must do for the tree."""
+    traverse_from = make_traversal_from(query, accuracy, length, entries, counters)
+    begin, tree_type, state_type = QUERIES[query].begin, HANDLES[accuracy], STATES[QUERIES[query].state]
+
+    @without_gradient
+    @wp.func
+    def traverse(tree: tree_type, ray: RayFrame, lane: int) -> state_type:
+        return traverse_from(tree, ray, lane, begin(ray))
+
+    return traverse
+
+
+@functools.cache
+def make_traversal_from(query: str, accuracy: str, length: int, entries: int, counters: bool) -> wp.Function:
+    """The same, beginning with what its last argument holds."""
     asked = QUERIES[query]
     in_order: bool = asked.in_order
     make_triangles, kept_words = TRIANGLES[accuracy]
@@ -72,7 +97,9 @@ def make_traversal(query: str, accuracy: str, length: int, entries: int, counter
     triangles = make_triangles(lanes, entries * (2 if in_order else 1))
     visit = make_visit(lanes, entries, in_order)
     test_leaf = make_leaf_test(asked, lanes, triangles)
-    tree_type = HANDLES[accuracy]
+    tree_type, best_type, state_type = HANDLES[accuracy], asked.state, STATES[asked.state]
+    one_is_enough: bool = asked.one_is_enough
+    done = asked.done
     prepare = triangles.prepare
     new_stack, sync = lanes.new_stack, lanes.sync
     store_word, load_word = lanes.store_word, lanes.load_word
@@ -80,12 +107,11 @@ def make_traversal(query: str, accuracy: str, length: int, entries: int, counter
 
     @without_gradient
     @wp.func
-    def traverse(tree: tree_type, ray: RayFrame, lane: int) -> Traversal:
+    def traverse_from(tree: tree_type, ray: RayFrame, lane: int, best: best_type) -> state_type:
         units = address_of(tree.units)
         words = wp.uint32(tree.units.shape[0])
-        state = Traversal()
-        state.best.t = ray.tmax
-        state.best.prim = wp.static(NO_PRIM)
+        state = state_type()
+        state.best = best
         state.tmax = ray.tmax
         stack = new_stack()
         prepare(ray, stack)
@@ -124,10 +150,9 @@ def make_traversal(query: str, accuracy: str, length: int, entries: int, counter
                     state.triangles += count_triangles(units, begin, wp.min(blocks, last + 1))
                 if wp.static(in_order):
                     state.tmax = unsortable(min_reduce(sortable(state.best.t)))
-                elif or_reduce(
-                    wp.where(state.best.prim == wp.static(NO_PRIM), wp.uint32(0), wp.uint32(1))
-                ) != wp.uint32(0):
-                    break
+                if wp.static(one_is_enough):  # noqa: SIM102
+                    if or_reduce(wp.where(done(state.best), wp.uint32(1), wp.uint32(0))) != wp.uint32(0):
+                        break
                 top -= 1
             child = wp.cast(load_word(stack, top), wp.int32)
             if wp.static(in_order):
@@ -138,7 +163,7 @@ def make_traversal(query: str, accuracy: str, length: int, entries: int, counter
             sync()
         return state
 
-    return traverse
+    return traverse_from
 
 
 @wp.func
@@ -160,11 +185,25 @@ class TestedLeaf:
     last: wp.int32
 
 
+@wp.struct
+class CrossedLeaf:
+    """The same of a query for everything along the ray."""
+
+    best: Crossings
+    last: wp.int32
+
+
+# What a traversal and a leaf's test return, by what the query keeps.
+STATES = {Best: Traversal, Crossings: Crossed}
+LEAVES = {Best: TestedLeaf, Crossings: CrossedLeaf}
+
+
 def make_leaf_test(asked: SimpleNamespace, lanes: SimpleNamespace, triangles: SimpleNamespace) -> wp.Function:
     """The test of a leaf's blocks: one thread takes all, or eight a triangle each of two blocks at a time."""
     stack_argument = lanes.stack_argument
     candidates, solve = triangles.candidates, triangles.solve
     offer, done = asked.offer, asked.done
+    best_type, leaf_type = asked.state, LEAVES[asked.state]
     length: int = lanes.triangles_length
     block_step: int = lanes.block_step
 
@@ -177,9 +216,9 @@ def make_leaf_test(asked: SimpleNamespace, lanes: SimpleNamespace, triangles: Si
         lane: int,
         stack: stack_argument,
         tmin: float,
-        best: Best,
-    ) -> TestedLeaf:
-        leaf = TestedLeaf()
+        best: best_type,
+    ) -> leaf_type:
+        leaf = leaf_type()
         leaf.best = best
         leaf.last = 7
         i = int(lane // wp.static(BLOCK_WIDTH))

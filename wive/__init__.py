@@ -3,6 +3,7 @@
 >>> scene = wive.Scene(vertices, faces)
 >>> hits = scene.intersect(origins, directions)   # closest hits: t, prim, uv
 >>> shadowed = scene.occluded(origins, directions)
+>>> crossings = scene.intersect_all(origins, directions)   # every hit along every ray
 
 The method is that of Fuetterling, Lojewski, Pfreundt, Hamann and Ebert, "Accelerated Single Ray
 Tracing for Wide Vector Units", High-Performance Graphics 2017.
@@ -16,6 +17,7 @@ except ImportError as error:
         "install with `pip install .` and don't import wive from inside its source folder"
     ) from error
 
+from wive.all_hits import AllHits
 from wive.backend import Backend, backends
 from wive.camera import Camera
 from wive.hits import Hits, Stats
@@ -25,4 +27,15 @@ from wive.scene import Scene, load
 
 __version__ = "0.1.0"
 
-__all__ = ["Backend", "Camera", "Hits", "Scene", "Stats", "backends", "load", "load_mesh", "render"]
+__all__ = [
+    "AllHits",
+    "Backend",
+    "Camera",
+    "Hits",
+    "Scene",
+    "Stats",
+    "backends",
+    "load",
+    "load_mesh",
+    "render",
+]

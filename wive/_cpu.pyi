@@ -96,6 +96,40 @@ class Bvh:
         stats: bool = False,
     ) -> tuple[NDArray[np.bool_], NDArray[np.int32] | None]:
         """Whether anything lies in [tmin, tmax]: (n,) bool, and stats (n,3) or None."""
+    def intersect_all(
+        self,
+        kernel: str,
+        origins: NDArray[np.float32],
+        directions: NDArray[np.float32],
+        tmin: NDArray[np.float32],
+        tmax: NDArray[np.float32],
+        threads: int = 0,
+        in_flight: int = 0,
+        stats: bool = False,
+    ) -> tuple[
+        NDArray[np.int64],
+        NDArray[np.float32],
+        NDArray[np.int32],
+        NDArray[np.float32],
+        NDArray[np.int32] | None,
+    ]:
+        """All hits: offsets (n+1,), t (h,), prim (h,), uv (h,2), and stats (n,3) or None.
+
+        Those of ray i are rows offsets[i] to offsets[i+1], by ascending t, then prim. Raises MemoryError
+        where they don't fit.
+        """
+    def count(
+        self,
+        kernel: str,
+        origins: NDArray[np.float32],
+        directions: NDArray[np.float32],
+        tmin: NDArray[np.float32],
+        tmax: NDArray[np.float32],
+        threads: int = 0,
+        in_flight: int = 0,
+        stats: bool = False,
+    ) -> tuple[NDArray[np.int32], NDArray[np.int32] | None]:
+        """How many triangles each ray meets in [tmin, tmax]: (n,) int32, and stats (n,3) or None."""
     def render_rows(
         self,
         kernel: str,

@@ -7,6 +7,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from wive.arrays import Library
+
 
 class Stats(NamedTuple):
     """What each ray did, three (n,) int32 arrays: inner nodes visited, leaves visited, triangles tested."""
@@ -14,6 +16,39 @@ class Stats(NamedTuple):
     inner_nodes: NDArray[np.int32]
     leaves: NDArray[np.int32]
     triangles: NDArray[np.int32]
+
+
+def stats_of(table: NDArray[np.int32] | None, library: Library) -> Stats | None:
+    """The columns of an (n,3) table of steps as arrays of that library."""
+    if table is None:
+        return None
+    return Stats(*(library.from_numpy(np.ascontiguousarray(column)) for column in table.T))
+
+
+def surface_points(
+    vertices: NDArray[np.float32], faces: NDArray[np.int32], prim: NDArray[np.int32], uv: NDArray[np.float32]
+) -> NDArray[np.float64]:
+    """(h,3) points at uv (h,2) of triangles prim (h,)."""
+    v0, v1, v2 = _corners(vertices, faces, prim)
+    u, v = uv.astype(np.float64).T[:, :, None]
+    points: NDArray[np.float64] = (1 - u - v) * v0 + u * v1 + v * v2
+    return points
+
+
+def surface_normals(
+    vertices: NDArray[np.float32], faces: NDArray[np.int32], prim: NDArray[np.int32]
+) -> NDArray[np.float64]:
+    """(h,3) unit normals of triangles prim (h,), by the right-hand winding."""
+    v0, v1, v2 = _corners(vertices, faces, prim)
+    across = np.cross(v1 - v0, v2 - v0)
+    normals: NDArray[np.float64] = across / np.linalg.norm(across, axis=1, keepdims=True)
+    return normals
+
+
+def _corners(
+    vertices: NDArray[np.float32], faces: NDArray[np.int32], prim: NDArray[np.int32]
+) -> NDArray[np.float64]:
+    return vertices[faces[prim]].astype(np.float64).swapaxes(0, 1)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -49,10 +84,8 @@ class Hits:
         from the origin.
         """
         hit = self.mask
-        v0, v1, v2 = self._corners(hit)
-        u, v = self.uv[hit].astype(np.float64).T[:, :, None]
         points = np.full((len(self), 3), np.nan)
-        points[hit] = (1 - u - v) * v0 + u * v1 + v * v2
+        points[hit] = surface_points(self.vertices, self.faces, self.prim[hit], self.uv[hit])
         return points
 
     def normals(self) -> NDArray[np.float64]:
@@ -61,10 +94,8 @@ class Hits:
         Computed at each call. The normal is the triangle's, whichever side the ray came from.
         """
         hit = self.mask
-        v0, v1, v2 = self._corners(hit)
-        across = np.cross(v1 - v0, v2 - v0)
         normals = np.full((len(self), 3), np.nan)
-        normals[hit] = across / np.linalg.norm(across, axis=1, keepdims=True)
+        normals[hit] = surface_normals(self.vertices, self.faces, self.prim[hit])
         return normals
 
     def __len__(self) -> int:
@@ -74,10 +105,6 @@ class Hits:
     def __repr__(self) -> str:
         """Number of rays and of hits."""
         return f"Hits({len(self)} rays, {np.count_nonzero(self.mask)} hit)"
-
-    def _corners(self, hit: NDArray[np.bool_]) -> NDArray[np.float64]:
-        """(3,h,3) corners of the triangles hit."""
-        return self.vertices[self.faces[self.prim[hit]]].astype(np.float64).swapaxes(0, 1)
 
 
 class WrappedHits(Hits):

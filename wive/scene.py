@@ -9,20 +9,19 @@ from numpy.typing import ArrayLike, NDArray
 from wive import _cpu, arguments
 from wive.arrays import NUMPY, host_array
 from wive.backend import available_threads, resolve_backend
+from wive.crossings import CrossingQueries, LanesOption
 from wive.files import PathLike
-from wive.hits import Hits, Stats, WrappedHits
+from wive.hits import Hits, Stats, WrappedHits, stats_of
 from wive.meshfile import load_mesh
-from wive.rays import Rays, check_rays
+from wive.rays import check_rays
 from wive.storage import Options, read_scene, write_scene
 
 if TYPE_CHECKING:
     from wive.warp_kernels import Tree
     from wive.warp_tracer import WarpTracer
 
-LanesOption = Literal["auto", 8, 1]
 
-
-class Scene:
+class Scene(CrossingQueries):
     """A triangle mesh that answers ray queries.
 
     A scene never changes, so several threads may query it at once, and so may processes forked from this one.
@@ -143,7 +142,7 @@ class Scene:
             hits, counts = self._warp.intersect(rays, chosen, bool(stats))
         else:
             t, prim, uv, table = self._bvh.intersect(self._backend, *rays.numpy(), *work)
-            hits, counts = Hits(t, prim, uv, self._vertices, self._faces), _columns(table, rays)
+            hits, counts = Hits(t, prim, uv, self._vertices, self._faces), stats_of(table, rays.library)
             if rays.library is not NUMPY:
                 hits = WrappedHits(hits, rays.library.from_numpy)
         return hits if counts is None else (hits, counts)
@@ -195,7 +194,7 @@ class Scene:
             mask, counts = self._warp.occluded(rays, chosen, bool(stats))
         else:
             found, table = self._bvh.occluded(self._backend, *rays.numpy(), *work)
-            mask, counts = rays.library.from_numpy(found), _columns(table, rays)
+            mask, counts = rays.library.from_numpy(found), stats_of(table, rays.library)
         return mask if counts is None else (mask, counts)
 
     def save(self, path: PathLike) -> None:
@@ -280,12 +279,6 @@ def load(path: PathLike, *, backend: str | None = None, device: str | None = Non
 
 def _rebuild(vertices: NDArray[np.float32], faces: NDArray[np.int32], options: Options) -> Scene:
     return Scene(vertices, faces, **options)
-
-
-def _columns(table: NDArray[np.int32] | None, rays: Rays) -> Stats | None:
-    if table is None:
-        return None
-    return Stats(*(rays.library.from_numpy(np.ascontiguousarray(column)) for column in table.T))
 
 
 def _read_only(array: NDArray[Any]) -> NDArray[Any]:

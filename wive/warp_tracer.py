@@ -6,12 +6,23 @@ from typing import Any
 import warp as wp
 
 from wive import _cpu
+from wive.all_hits import AllHits, WrappedAllHits
 from wive.arguments import Float32, Int32, Lanes
 from wive.arrays import NUMPY
 from wive.hits import Hits, Stats, WrappedHits
 from wive.rays import Rays
+from wive.warp_all_hits import WarpAllHits
 from wive.warp_hits import WarpHits
-from wive.warp_kernels import check, launch_any, launch_closest, upload
+from wive.warp_kernels import (
+    MOST_HITS,
+    check,
+    launch_all,
+    launch_any,
+    launch_closest,
+    launch_count,
+    scan_counts,
+    upload,
+)
 from wive.warp_rays import RayLoader, WarpRays
 
 # Below it eight threads a ray keep a GPU busy and answer sooner; above it one thread a ray answers more.
@@ -63,6 +74,43 @@ class WarpTracer:
                 check(self.tree)
                 return mask.numpy(), _numpy_stats(counts)
             return rays.library.from_warp(mask), _stats(counts, rays)
+
+    def count(self, rays: Rays, lanes: Lanes | None, stats: bool) -> tuple[Any, Stats | None]:
+        """How many hits each ray has, in an array of the library that the rays came in."""
+        with rays.library.on_stream(self.device):
+            counts, steps = self._count(self._load(rays), lanes, stats)
+            if rays.library is NUMPY:
+                check(self.tree)
+                return counts.numpy(), _numpy_stats(steps)
+            return rays.library.from_warp(counts), _stats(steps, rays)
+
+    def intersect_all(self, rays: Rays, lanes: Lanes | None, stats: bool) -> tuple[AllHits, Stats | None]:
+        """All hits: one pass counts them, which makes room for the pass that lists them."""
+        with rays.library.on_stream(self.device):
+            loaded = self._load(rays)
+            counts, steps = self._count(loaded, lanes, stats)
+            offsets = scan_counts(counts)
+            total = int(offsets[-1:].numpy()[0])
+            if total > MOST_HITS:
+                raise MemoryError(
+                    f"{total} hits are more than a Warp array holds ({MOST_HITS}): "
+                    "split the rays into batches"
+                )
+            t, prim, uv = self._outputs(total)
+            chosen = self._lanes(lanes, loaded)
+            launch_all(self.tree, *_arrays(loaded), counts, offsets, t, prim, uv, lanes=chosen)
+            if rays.library is NUMPY:
+                check(self.tree)
+                arrays = offsets.numpy(), t.numpy(), prim.numpy(), uv.numpy()
+                return AllHits(*arrays, self._vertices, self._faces), _numpy_stats(steps)
+            inner = WarpAllHits(t, prim, uv, self._vertices, self._faces, self.mesh, offsets)
+            return WrappedAllHits(inner, rays.library.from_warp), _stats(steps, rays)
+
+    def _count(self, rays: WarpRays, lanes: Lanes | None, stats: bool) -> tuple[Any, Any]:
+        counts = wp.empty(len(rays), dtype=wp.int32, device=self.device)
+        steps = self._counts(len(rays), stats)
+        launch_count(self.tree, *_arrays(rays), counts, stats=steps, lanes=self._lanes(lanes, rays))
+        return counts, steps
 
     @functools.cached_property
     def _mesh(self) -> tuple[Any, Any]:

@@ -1,0 +1,97 @@
+"""The kernels for everything along a ray: one that counts, one that lists what was counted."""
+
+# mypy: ignore-errors
+# Warp compiles these functions: to mypy they are no Python.
+
+import functools
+
+import warp as wp
+
+from wive.warp_kernels.frame import load_frame
+from wive.warp_kernels.handle import HANDLES, Hit
+from wive.warp_kernels.kernels import MODULE_OPTIONS, value_of
+from wive.warp_kernels.lanes import reductions, sum_reduction
+from wive.warp_kernels.query_all import begin_crossings
+from wive.warp_kernels.traversal import Crossed, make_traversal, make_traversal_from
+
+
+@wp.func_native("return (wp::uint64)(hits.data + first);")
+def address_of_hit(hits: wp.array(dtype=Hit), first: wp.int64) -> wp.uint64:
+    """Where a ray's hits begin."""
+    ...
+
+
+@wp.func_native("return (wp::uint64)(left.data + i);")
+def address_of_number(left: wp.array(dtype=wp.int32), i: int) -> wp.uint64:
+    """Where the number of a ray's hits that are still to come stands."""
+    ...
+
+
+@functools.cache
+def count_kernel(accuracy: str, length: int, stack: int, counters: bool) -> wp.Kernel:
+    """The kernel behind `launch_count`, of dimensions (n, 8 // length)."""
+    traverse = make_traversal("count", accuracy, length, stack, counters)
+    or_reduce, _ = reductions(length)
+    add_reduce = sum_reduction(length)
+    tree_type = HANDLES[accuracy]
+
+    @wp.kernel(module="unique", enable_backward=False, grid_stride=False, module_options=MODULE_OPTIONS)
+    def count_along(
+        tree: tree_type,
+        origins: wp.array(dtype=wp.vec3),
+        directions: wp.array(dtype=wp.vec3),
+        tmin: wp.array(dtype=wp.float32),
+        tmax: wp.array(dtype=wp.float32),
+        counts: wp.array(dtype=wp.int32),
+        stats: wp.array(dtype=wp.vec3i),
+    ):
+        i, lane = wp.tid()
+        ray = load_frame(
+            tree.center, tree.extent, origins[i], directions[i], value_of(tmin, i), value_of(tmax, i)
+        )
+        found = Crossed()
+        if ray.valid and or_reduce(wp.uint32(tree.error[0])) == wp.uint32(0):
+            found = traverse(tree, ray, lane)
+        count = add_reduce(wp.uint32(found.best.count))
+        if lane == 0:
+            counts[i] = wp.int32(count)
+            if wp.static(counters):
+                stats[i] = wp.vec3i(found.inner_nodes, found.leaves, found.triangles)
+
+    return count_along
+
+
+@functools.cache
+def all_kernel(accuracy: str, length: int, stack: int) -> wp.Kernel:
+    """The kernel that lists the hits behind `launch_all`, of dimensions (n, 8 // length)."""
+    traverse_from = make_traversal_from("all", accuracy, length, stack, False)
+    or_reduce, _ = reductions(length)
+    tree_type = HANDLES[accuracy]
+
+    @wp.kernel(module="unique", enable_backward=False, grid_stride=False, module_options=MODULE_OPTIONS)
+    def list_along(
+        tree: tree_type,
+        origins: wp.array(dtype=wp.vec3),
+        directions: wp.array(dtype=wp.vec3),
+        tmin: wp.array(dtype=wp.float32),
+        tmax: wp.array(dtype=wp.float32),
+        offsets: wp.array(dtype=wp.int64),
+        left: wp.array(dtype=wp.int32),
+        hits: wp.array(dtype=Hit),
+    ):
+        i, lane = wp.tid()
+        first = offsets[i]
+        # A ray for which the first pass found nothing is not asked again; the answer is one for the group.
+        if offsets[i + 1] == first:
+            return
+        ray = load_frame(
+            tree.center, tree.extent, origins[i], directions[i], value_of(tmin, i), value_of(tmax, i)
+        )
+        if ray.valid and or_reduce(wp.uint32(tree.error[0])) == wp.uint32(0):
+            found = begin_crossings(ray)
+            found.scale = ray.scale
+            found.hits = address_of_hit(hits, first)
+            found.left = address_of_number(left, i)
+            traverse_from(tree, ray, lane, found)
+
+    return list_along

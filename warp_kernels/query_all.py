@@ -1,0 +1,55 @@
+"""What queries for everything along a ray keep of the hits they are offered, as cpu/query_all.h."""
+
+# mypy: ignore-errors
+# Warp compiles these functions: to mypy they are no Python.
+import warp as wp
+
+from wive.warp_kernels.frame import RayFrame
+from wive.warp_kernels.native import LIST_HIT
+
+
+@wp.struct
+class Crossings:
+    """How many triangles one thread has met, and where it puts them."""
+
+    t: wp.float32  # the farthest that is asked for, in the frame's units
+    count: wp.int32
+    scale: wp.float32  # t of the caller's ray = scale * t here
+    hits: wp.uint64  # address of the ray's first `Hit`
+    left: wp.uint64  # address of the number of them that are still to come
+
+
+@wp.func
+def begin_crossings(ray: RayFrame):
+    """Nothing met yet."""
+    none = Crossings()
+    none.t = ray.tmax
+    return none
+
+
+@wp.func_native(LIST_HIT)
+def list_hit(hits: wp.uint64, left: wp.uint64, t: float, u: float, v: float, prim: int):
+    """Put a hit where the last one that is still to come belongs; the ray's other threads do so, too."""
+    ...
+
+
+@wp.func
+def offer_count(found: Crossings, tmin: float, hit: wp.vec3, prim: int):
+    """Count every hit in [tmin, t]."""
+    if hit[0] >= tmin and hit[0] <= found.t:
+        found.count += 1
+    return found
+
+
+@wp.func
+def offer_all(found: Crossings, tmin: float, hit: wp.vec3, prim: int):
+    """List every hit in [tmin, t]."""
+    if hit[0] >= tmin and hit[0] <= found.t:
+        list_hit(found.hits, found.left, hit[0] * found.scale, hit[1], hit[2], prim)
+    return found
+
+
+@wp.func
+def never_done(found: Crossings):
+    """Whether one thread's hits end the query."""
+    return False

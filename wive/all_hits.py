@@ -1,0 +1,126 @@
+"""What `Scene.intersect_all` returns: every hit along every ray."""
+
+import operator
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wive.hits import surface_normals, surface_points
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class AllHits:
+    """All hits of n rays, h in all: ray by ray, each ray's by ascending t, at equal t by ascending prim.
+
+    Arrays are NumPy's where the rays were, else of the library and on the device that the rays came in;
+    `vertices` and `faces` are always NumPy's. `all_hits[i]` are those of ray i alone, again as `AllHits`, and
+    iterating goes through the rays.
+
+    Attributes:
+        offsets: (n+1,) int64, the hits of ray i are rows offsets[i] to offsets[i+1] of the arrays below.
+        t: (h,) float32, distance in multiples of the direction's length.
+        prim: (h,) int32, row of `faces` that was hit.
+        uv: (h,2) float32, the hit point is (1-u-v) v0 + u v1 + v v2.
+        vertices: (v,3) float32 and
+        faces: (f,3) int32, the mesh that `prim` refers to.
+    """
+
+    offsets: NDArray[np.int64]
+    t: NDArray[np.float32]
+    prim: NDArray[np.int32]
+    uv: NDArray[np.float32]
+    vertices: NDArray[np.float32]
+    faces: NDArray[np.int32]
+
+    @property
+    def counts(self) -> NDArray[np.int32]:
+        """(n,) int32 number of hits of each ray; computed at each call."""
+        return np.diff(self.offsets).astype(np.int32)
+
+    @property
+    def ray(self) -> NDArray[np.int64]:
+        """(h,) int64 ray of each hit; computed at each call."""
+        return np.repeat(np.arange(len(self)), np.diff(self.offsets))
+
+    def points(self) -> NDArray[np.float64]:
+        """(h,3) float64 hit points from the barycentrics, as `Hits.points`; computed at each call."""
+        return surface_points(self.vertices, self.faces, self.prim, self.uv)
+
+    def normals(self) -> NDArray[np.float64]:
+        """(h,3) float64 unit normals by the right-hand winding, as `Hits.normals`; computed at each call."""
+        return surface_normals(self.vertices, self.faces, self.prim)
+
+    def __len__(self) -> int:
+        """Number of rays."""
+        return len(self.offsets) - 1
+
+    def __getitem__(self, i: int) -> "AllHits":
+        """The hits of ray i, views of the same arrays; IndexError where there is no such ray."""
+        first, last = (int(offset) for offset in self.offsets[row_of(i, len(self)) :][:2])
+        rows = slice(first, last)
+        offsets = np.array([0, last - first])
+        return AllHits(offsets, self.t[rows], self.prim[rows], self.uv[rows], self.vertices, self.faces)
+
+    def __iter__(self) -> Iterator["AllHits"]:
+        """The hits of each ray in turn."""
+        return (self[i] for i in range(len(self)))
+
+    def __repr__(self) -> str:
+        """Number of rays and of hits."""
+        return f"AllHits({len(self)} rays, {len(self.t)} hits)"
+
+
+class WrappedAllHits(AllHits):
+    """All hits in the arrays of another library: what `wrap` makes of those that they were computed in."""
+
+    _home: Any
+    _wrap: Callable[[Any], Any]
+
+    def __init__(self, home: Any, wrap: Callable[[Any], Any]) -> None:
+        """Wrap the arrays of `home`, an `AllHits` or a `wive.warp_all_hits.WarpAllHits`."""
+        offsets, t, prim, uv = map(wrap, (home.offsets, home.t, home.prim, home.uv))
+        super().__init__(offsets, t, prim, uv, home.vertices, home.faces)
+        object.__setattr__(self, "_home", home)
+        object.__setattr__(self, "_wrap", wrap)
+
+    @property
+    def counts(self) -> Any:
+        """(n,) int32 number of hits of each ray."""
+        return self._wrap(self._home.counts)
+
+    @property
+    def ray(self) -> Any:
+        """(h,) int64 ray of each hit."""
+        return self._wrap(self._home.ray)
+
+    def points(self) -> Any:
+        """(h,3) float64 hit points, as `AllHits.points`."""
+        return self._wrap(self._home.points())
+
+    def normals(self) -> Any:
+        """(h,3) float64 unit normals, as `AllHits.normals`."""
+        return self._wrap(self._home.normals())
+
+    def __len__(self) -> int:
+        """Number of rays."""
+        return len(self._home)
+
+    def __getitem__(self, i: int) -> AllHits:
+        """The hits of ray i; on a device this waits for it."""
+        return WrappedAllHits(self._home[i], self._wrap)
+
+    def __repr__(self) -> str:
+        """Number of rays and of hits, and where they are."""
+        library = type(self.t).__module__.partition(".")[0]
+        return f"AllHits({len(self)} rays, {self._home.t.shape[0]} hits, in arrays of {library})"
+
+
+def row_of(i: int, count: int) -> int:
+    """`i` as an index from 0, counted from the end where it is negative."""
+    row = operator.index(i)
+    if not -count <= row < count:
+        raise IndexError(f"ray {row} of {count}: count from 0 to {count - 1}")
+    return row % count

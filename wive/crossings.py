@@ -1,0 +1,143 @@
+"""The queries for everything along a ray: all hits, and how many there are."""
+
+from typing import TYPE_CHECKING, Any, Literal, overload
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from wive import _cpu, arguments
+from wive.all_hits import AllHits, WrappedAllHits
+from wive.arrays import NUMPY
+from wive.backend import available_threads
+from wive.hits import Stats, stats_of
+from wive.rays import check_rays
+
+if TYPE_CHECKING:
+    from wive.warp_tracer import WarpTracer
+
+LanesOption = Literal["auto", 8, 1]
+
+
+class CrossingQueries:
+    """The part of `wive.Scene` that does not stop at the first hit."""
+
+    _bvh: _cpu.Bvh
+    _vertices: NDArray[np.float32]
+    _faces: NDArray[np.int32]
+    _backend: str
+    _device: str | None
+    _warp: "WarpTracer | None"
+
+    @overload
+    def intersect_all(
+        self,
+        origins: ArrayLike,
+        directions: ArrayLike,
+        tmin: ArrayLike = 0.0,
+        tmax: ArrayLike = np.inf,
+        *,
+        threads: int | None = None,
+        in_flight: int | None = None,
+        lanes: LanesOption = "auto",
+        stats: Literal[False] = False,
+    ) -> AllHits: ...
+    @overload
+    def intersect_all(
+        self,
+        origins: ArrayLike,
+        directions: ArrayLike,
+        tmin: ArrayLike = 0.0,
+        tmax: ArrayLike = np.inf,
+        *,
+        threads: int | None = None,
+        in_flight: int | None = None,
+        lanes: LanesOption = "auto",
+        stats: Literal[True],
+    ) -> tuple[AllHits, Stats]: ...
+    def intersect_all(
+        self,
+        origins: ArrayLike,
+        directions: ArrayLike,
+        tmin: ArrayLike = 0.0,
+        tmax: ArrayLike = np.inf,
+        *,
+        threads: int | None = None,
+        in_flight: int | None = None,
+        lanes: LanesOption = "auto",
+        stats: bool = False,
+    ) -> AllHits | tuple[AllHits, Stats]:
+        """Every triangle that each ray meets with tmin <= t <= tmax, each once, however many there are.
+
+        Arguments are those of `intersect`. Each ray's hits come by ascending t, at equal t by ascending prim;
+        the first is what `intersect` returns. A ray through an edge or a vertex meets every triangle there.
+
+        CPU backends trace once; a hit takes 24 bytes until all are found, then 16. Warp traces twice, to
+        count and to fill, and waits for the device in between: CUDA graphs can't capture this query.
+
+        Raises ValueError or TypeError, in one line naming the argument, and MemoryError where the hits don't
+        fit into memory.
+        """
+        rays = check_rays(origins, directions, tmin, tmax, self._backend, self._device)
+        chosen = arguments.lanes(lanes, self._warp is not None)
+        work = arguments.work(threads, available_threads(), in_flight, stats)
+        counts: Stats | None
+        if self._warp is not None:
+            hits, counts = self._warp.intersect_all(rays, chosen, bool(stats))
+        else:
+            offsets, t, prim, uv, table = self._bvh.intersect_all(self._backend, *rays.numpy(), *work)
+            hits = AllHits(offsets, t, prim, uv, self._vertices, self._faces)
+            counts = stats_of(table, rays.library)
+            if rays.library is not NUMPY:
+                hits = WrappedAllHits(hits, rays.library.from_numpy)
+        return hits if counts is None else (hits, counts)
+
+    @overload
+    def count(
+        self,
+        origins: ArrayLike,
+        directions: ArrayLike,
+        tmin: ArrayLike = 0.0,
+        tmax: ArrayLike = np.inf,
+        *,
+        threads: int | None = None,
+        in_flight: int | None = None,
+        lanes: LanesOption = "auto",
+        stats: Literal[False] = False,
+    ) -> NDArray[np.int32]: ...
+    @overload
+    def count(
+        self,
+        origins: ArrayLike,
+        directions: ArrayLike,
+        tmin: ArrayLike = 0.0,
+        tmax: ArrayLike = np.inf,
+        *,
+        threads: int | None = None,
+        in_flight: int | None = None,
+        lanes: LanesOption = "auto",
+        stats: Literal[True],
+    ) -> tuple[NDArray[np.int32], Stats]: ...
+    def count(
+        self,
+        origins: ArrayLike,
+        directions: ArrayLike,
+        tmin: ArrayLike = 0.0,
+        tmax: ArrayLike = np.inf,
+        *,
+        threads: int | None = None,
+        in_flight: int | None = None,
+        lanes: LanesOption = "auto",
+        stats: bool = False,
+    ) -> NDArray[np.int32] | tuple[NDArray[np.int32], Stats]:
+        """(n,) int32: how many hits `intersect_all` finds for each ray; arguments as for `intersect`."""
+        rays = check_rays(origins, directions, tmin, tmax, self._backend, self._device)
+        chosen = arguments.lanes(lanes, self._warp is not None)
+        work = arguments.work(threads, available_threads(), in_flight, stats)
+        counted: Any
+        steps: Stats | None
+        if self._warp is not None:
+            counted, steps = self._warp.count(rays, chosen, bool(stats))
+        else:
+            found, table = self._bvh.count(self._backend, *rays.numpy(), *work)
+            counted, steps = rays.library.from_numpy(found), stats_of(table, rays.library)
+        return counted if steps is None else (counted, steps)
