@@ -8,10 +8,20 @@
 #include <thread>
 #include <vector>
 
+#if defined(__linux__)
+#include <sched.h>
+#endif
+
 namespace wive {
 
+// As many threads as asked for; 0 is one for each core that this process may run on.
 inline unsigned thread_count(unsigned asked) {
-    return asked > 0 ? asked : std::max(1u, std::thread::hardware_concurrency());
+    if (asked > 0) return asked;
+#if defined(__linux__)
+    cpu_set_t cores;
+    if (sched_getaffinity(0, sizeof(cores), &cores) == 0) return static_cast<unsigned>(CPU_COUNT(&cores));
+#endif
+    return std::max(1u, std::thread::hardware_concurrency());
 }
 
 // Calls work(i) once for every i in [0, count), on the calling thread and up to threads - 1 more.

@@ -2,7 +2,7 @@
 
 import operator
 from collections.abc import Iterable, Sequence
-from typing import Any, Literal
+from typing import Any, Literal, TypeGuard
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -96,8 +96,8 @@ def rays(
 
     A vector of shape (3,) is that of every ray.
     """
-    origin_rows = _vectors("origins", origins)
-    direction_rows = _vectors("directions", directions)
+    origin_rows = origins if _is_ready(origins) else _vectors("origins", origins)
+    direction_rows = directions if _is_ready(directions) else _vectors("directions", directions)
     if origin_rows.ndim == direction_rows.ndim == 1:
         origin_rows, direction_rows = origin_rows[None], direction_rows[None]
     elif origin_rows.ndim == 1:
@@ -112,10 +112,10 @@ def rays(
     return origin_rows, direction_rows, limits("tmin", tmin, count), limits("tmax", tmax, count)
 
 
-def threads(value: int | None, available: int) -> int:
-    """The number of threads to use: None is every core."""
+def threads(value: int | None) -> int:
+    """The number of threads to use; 0 is one for each core that this process may run on."""
     if value is None:
-        return available
+        return 0
     return min(integer("threads", value, 1), MOST_THREADS)
 
 
@@ -124,11 +124,9 @@ def in_flight(value: int | None) -> int:
     return 0 if value is None else integer("in_flight", value, 1)
 
 
-def work(
-    asked_threads: int | None, available: int, asked_in_flight: int | None, stats: bool
-) -> tuple[int, int, bool]:
+def work(asked_threads: int | None, asked_in_flight: int | None, stats: bool) -> tuple[int, int, bool]:
     """How the core is to trace: threads, rays in flight, whether to count."""
-    return threads(asked_threads, available), in_flight(asked_in_flight), bool(stats)
+    return threads(asked_threads), in_flight(asked_in_flight), bool(stats)
 
 
 def lanes(value: object, on_warp: bool) -> Lanes | None:
@@ -152,6 +150,18 @@ def limits(name: str, value: ArrayLike, count: int) -> Float32:
             f"{name} must be one number or have shape ({count},), one a ray, got shape {array.shape}"
         )
     return _float32(array.reshape(-1))
+
+
+def _is_ready(value: ArrayLike) -> TypeGuard[Float32]:
+    """Whether it is an (n,3) array as the core takes it: checks are most of a small call."""
+    return (
+        type(value) is np.ndarray
+        and value.dtype is FLOAT32
+        and value.ndim == 2
+        and value.shape[1] == 3
+        and (flags := value.flags).c_contiguous
+        and flags.aligned
+    )
 
 
 def _vectors(name: str, value: ArrayLike) -> Float32:

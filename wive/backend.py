@@ -1,6 +1,5 @@
-"""Which backends there are, which of them this machine can run, and how many threads it has for them."""
+"""Which backends there are, and which of them this machine can run."""
 
-import os
 from dataclasses import dataclass
 
 from wive import _cpu
@@ -73,10 +72,3 @@ def resolve_backend(name: str, device: str | None = None) -> tuple[str, str | No
             f"choose one of {', '.join(['auto', *usable])}"
         )
     return name, resolve_device(device) if name == WARP else None
-
-
-def available_threads() -> int:
-    """The number of cores this process may run on."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1

@@ -8,7 +8,6 @@ from numpy.typing import ArrayLike, NDArray
 from wive import _cpu, arguments
 from wive.all_hits import AllHits, WrappedAllHits
 from wive.arrays import NUMPY
-from wive.backend import available_threads
 from wive.hits import Stats, stats_of
 from wive.rays import check_rays
 
@@ -79,7 +78,7 @@ class CrossingQueries:
         """
         rays = check_rays(origins, directions, tmin, tmax, self._backend, self._device)
         chosen = arguments.lanes(lanes, self._warp is not None)
-        work = arguments.work(threads, available_threads(), in_flight, stats)
+        work = arguments.work(threads, in_flight, stats)
         counts: Stats | None
         if self._warp is not None:
             hits, counts = self._warp.intersect_all(rays, chosen, bool(stats))
@@ -132,7 +131,7 @@ class CrossingQueries:
         """(n,) int32: how many hits `intersect_all` finds for each ray; arguments as for `intersect`."""
         rays = check_rays(origins, directions, tmin, tmax, self._backend, self._device)
         chosen = arguments.lanes(lanes, self._warp is not None)
-        work = arguments.work(threads, available_threads(), in_flight, stats)
+        work = arguments.work(threads, in_flight, stats)
         counted: Any
         steps: Stats | None
         if self._warp is not None:

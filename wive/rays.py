@@ -43,9 +43,13 @@ def check_rays(
 
     Numbers and vectors of shape (3,) may always be NumPy's. Raises TypeError or ValueError otherwise.
     """
-    values = (origins, directions, tmin, tmax)
-    if all(isinstance(value, NUMPY_TYPES) for value in values):
-        return Rays(*values, NUMPY)
+    if (
+        isinstance(origins, NUMPY_TYPES)
+        and isinstance(directions, NUMPY_TYPES)
+        and isinstance(tmin, NUMPY_TYPES)
+        and isinstance(tmax, NUMPY_TYPES)
+    ):
+        return Rays(origins, directions, tmin, tmax, NUMPY)
     named = {"origins": origins, "directions": directions, "tmin": tmin, "tmax": tmax}
     libraries = {name: library_of(value) for name, value in named.items()}
     foreign = {name: library for name, library in libraries.items() if library is not NUMPY}

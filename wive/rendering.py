@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wive import arguments
-from wive.backend import available_threads
 from wive.camera import Camera
 from wive.files import PathLike, atomic_write, check_output
 from wive.progress import progress_bar
@@ -43,7 +42,7 @@ class Settings:
         arguments.integer("bounces", self.bounces, 0)
         arguments.choice("albedo", self.albedo, ALBEDOS)
         arguments.integer("seed", self.seed, 0)
-        arguments.threads(self.threads, 1)
+        arguments.threads(self.threads)
 
 
 def render(
@@ -105,7 +104,7 @@ def _rows_renderer(scene: Scene, frame: Image, image: Image, settings: Settings)
         from wive.warp_render import PictureRenderer
 
         return PictureRenderer(scene._warp, frame, image, *what).render_rows
-    threads = arguments.threads(settings.threads, available_threads())
+    threads = arguments.threads(settings.threads)
     return lambda begin, end: scene._bvh.render_rows(scene.backend, frame, image, begin, end, *what, threads)
 
 

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from wive import _cpu, arguments
 from wive.arrays import NUMPY, host_array
-from wive.backend import available_threads, resolve_backend
+from wive.backend import resolve_backend
 from wive.crossings import CrossingQueries, LanesOption
 from wive.files import PathLike
 from wive.hits import Hits, Stats, WrappedHits, stats_of
@@ -63,7 +63,7 @@ class Scene(CrossingQueries):
         self._backend, self._device = resolve_backend(backend, device)
         mesh = arguments.mesh(host_array("vertices", vertices), host_array("faces", faces))
         self._vertices, self._faces = map(_read_only, mesh)
-        self._bvh = _cpu.Bvh(self._vertices, self._faces, accuracy, threads=available_threads())
+        self._bvh = _cpu.Bvh(self._vertices, self._faces, accuracy)
         if self._device is not None:
             from wive.warp_tracer import WarpTracer
 
@@ -136,7 +136,7 @@ class Scene(CrossingQueries):
         """
         rays = check_rays(origins, directions, tmin, tmax, self._backend, self._device)
         chosen = arguments.lanes(lanes, self._warp is not None)
-        work = arguments.work(threads, available_threads(), in_flight, stats)
+        work = arguments.work(threads, in_flight, stats)
         counts: Stats | None
         if self._warp is not None:
             hits, counts = self._warp.intersect(rays, chosen, bool(stats))
@@ -188,7 +188,7 @@ class Scene(CrossingQueries):
         """(n,) bool: whether each ray hits anything with tmin <= t <= tmax; arguments as for `intersect`."""
         rays = check_rays(origins, directions, tmin, tmax, self._backend, self._device)
         chosen = arguments.lanes(lanes, self._warp is not None)
-        work = arguments.work(threads, available_threads(), in_flight, stats)
+        work = arguments.work(threads, in_flight, stats)
         counts: Stats | None
         if self._warp is not None:
             mask, counts = self._warp.occluded(rays, chosen, bool(stats))
