@@ -19,9 +19,8 @@ from bench.features import QUALITIES, qualities
 from bench.native_embree import Isa
 from bench.options import listed, numbers, scene_parser
 from bench.scenes import TERRAIN, SceneFolder
-from bench.timing import Effort
+from bench.timing import Effort, core_count
 from wive import _cpu
-from wive.backend import available_threads
 
 matplotlib.use("Agg")
 from matplotlib import pyplot
@@ -91,7 +90,7 @@ def scene_names(folder: SceneFolder) -> list[str]:
 
 def default_threads() -> tuple[int, ...]:
     """One thread, and all there are."""
-    return tuple(dict.fromkeys((1, available_threads())))
+    return tuple(dict.fromkeys((1, core_count())))
 
 
 def draw(build: Sequence[report.Row]) -> Figure:

@@ -9,8 +9,7 @@ from bench.features import Accuracy, build_tree
 from bench.native_embree import Isa, Quality, trim_heap
 from bench.report import Row
 from bench.scenes import Mesh
-from bench.timing import Comparison, Effort, compare
-from wive.backend import available_threads
+from bench.timing import Comparison, Effort, compare, core_count
 
 WARMED_UP = 4_000_000  # triangles from which a build takes so long that the first is like any other
 
@@ -68,7 +67,7 @@ def tree_row(mesh: Mesh, accuracy: Accuracy, isa: Isa, quality: Quality = "mediu
     ours = build_tree(mesh, accuracy, quality=quality)
     inner, leaves = ours.sah
     theirs = embree_statistics(mesh, isa=isa, robust=accuracy == "watertight", quality=quality)
-    with embree_tree(mesh, accuracy, isa, available_threads(), quality) as tree:
+    with embree_tree(mesh, accuracy, isa, core_count(), quality) as tree:
         tree.commit()
         allocated = tree.memory / len(mesh.faces)
     their_sah = theirs.sah_inner + theirs.sah_leaves

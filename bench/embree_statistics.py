@@ -16,7 +16,7 @@ import numpy as np
 from bench.compiled_shim import BenchError
 from bench.native_embree import EmbreeMesh, Isa, Quality
 from bench.scenes import Mesh
-from wive.backend import available_threads
+from bench.timing import core_count
 
 
 @dataclass(frozen=True)
@@ -75,7 +75,7 @@ def parse(printed: str, name: str, complaint: str = "") -> TreeStatistics:
 def _build_talking(path: str, isa: Isa, robust: bool, quality: Quality) -> None:
     with np.load(path) as arrays:
         vertices, faces = arrays["vertices"], arrays["faces"]
-    threads = available_threads()
+    threads = core_count()
     with EmbreeMesh(
         vertices, faces, isa=isa, robust=robust, threads=threads, quality=quality, verbose=2
     ) as tree:

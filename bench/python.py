@@ -1,11 +1,12 @@
 """What a Python user sees: the same NumPy rays through embreex, trimesh, Warp, Open3D and wive, arrays out.
 
 `ratio`: the other's seconds over wive's for the same query on the same rays, in turn; above 1 wive is
-faster. With one thread both are held to one core and CPU time counts; with all threads wall-clock time does
-(embreex, trimesh and Warp's CPU device use one thread whatever there is). Each as it comes: wive
+faster. trimesh's intersector is measured against `wive.Scene` and against its drop-in replacement in
+`wive.trimesh`. With one thread both are held to one core and CPU time counts; with all threads wall-clock
+time does (embreex, trimesh and Warp's CPU device use one thread whatever there is). Each as it comes: wive
 watertight, the others as their defaults are. `hits`: how many each found; all-hit counts differ where
-trimesh steps over near hits or finds one twice. `one ray`: microseconds of a whole call for a single ray,
-median and 99th percentile.
+trimesh steps over near hits or finds one twice. The last table has microseconds of a whole call for a
+single ray, median and 99th percentile.
 """
 
 import argparse
@@ -14,15 +15,13 @@ from collections.abc import Iterator, Sequence
 import matplotlib
 import numpy as np
 
-import wive
 from bench import report
 from bench.latency import QUICK_SECONDS, measured
 from bench.options import listed, scene_parser
-from bench.python_callers import ALL, QUERIES, Caller, Ours, absent, answered, others
+from bench.python_callers import ALL, QUERIES, SCENE, Caller, Ours, absent, answered, others
 from bench.rays import Rays, recorded_rays
 from bench.scenes import Mesh, SceneFolder
-from bench.timing import QUICK, Effort, compare, geometric_mean, one_core, timed, wall_timed
-from wive.backend import available_threads
+from bench.timing import QUICK, Effort, compare, core_count, geometric_mean, one_core, timed, wall_timed
 
 matplotlib.use("Agg")
 from matplotlib import pyplot
@@ -38,10 +37,10 @@ SINGLE_RAYS = 64  # different ones, called in turn
 SINGLE_SECONDS = 0.5
 
 COLUMNS = [
-    "scene", "triangles", "rays", "query", "other", "threads", "count", "ratio", "low", "high", "wive_mrays",
-    "other_mrays", "wive_hits", "other_hits", "rounds",
+    "scene", "triangles", "rays", "query", "ours", "other", "threads", "count", "ratio", "low", "high",
+    "wive_mrays", "other_mrays", "wive_hits", "other_hits", "rounds",
 ]  # fmt: skip
-MEAN_COLUMNS = ["query", "other", "threads", "mean", "lowest", "lowest_at"]
+MEAN_COLUMNS = ["query", "ours", "other", "threads", "mean", "lowest", "lowest_at"]
 SINGLE_COLUMNS = ["scene", "query", "caller", "p50_us", "p99_us", "calls"]
 
 
@@ -57,7 +56,7 @@ def main(options: Sequence[str]) -> None:
     for name in folder.check(chosen.scenes or usual):
         mesh = folder.load(name)
         recorded = recorded_rays(mesh)
-        ours = Ours(wive.Scene(mesh.vertices, mesh.faces))
+        ours = Ours(mesh)
         rivals = [other for other in others(mesh) if answered(other.query)]
         for kind in chosen.rays:
             for row in speed_rows(mesh, ours, rivals, recorded[kind], chosen.quick):
@@ -77,23 +76,25 @@ def main(options: Sequence[str]) -> None:
 def speed_rows(
     mesh: Mesh, ours: Ours, rivals: Sequence[Caller], recorded: Rays, quick: bool
 ) -> Iterator[report.Row]:
-    """One row per rival and number of threads."""
+    """One row per rival, number of threads and counterpart of ours."""
     for rival in rivals:
         if rival.query == ALL:
             rays = recorded.thinned(QUICK_ALL_HITS_RAYS if quick else ALL_HITS_RAYS)
         else:
             rays = recorded.thinned(QUICK_RAYS if quick else RAYS)
-        for threads in dict.fromkeys((1, available_threads())):
-            yield {
-                "scene": mesh.name,
-                "triangles": len(mesh.faces),
-                "rays": rays.kind,
-                "query": rival.query,
-                "other": rival.name,
-                "threads": threads,
-                "count": len(rays),
-                **race(ours.caller(rival.query, threads), rival, rays, threads, quick),
-            }
+        for threads in dict.fromkeys((1, core_count())):
+            for mine in ours.counterparts(rival, threads):
+                yield {
+                    "scene": mesh.name,
+                    "triangles": len(mesh.faces),
+                    "rays": rays.kind,
+                    "query": rival.query,
+                    "ours": mine.name,
+                    "other": rival.name,
+                    "threads": threads,
+                    "count": len(rays),
+                    **race(mine, rival, rays, threads, quick),
+                }
 
 
 def race(ours: Caller, rival: Caller, rays: Rays, threads: int, quick: bool) -> report.Row:
@@ -123,7 +124,8 @@ def single_rows(
     mesh: Mesh, ours: Ours, rivals: Sequence[Caller], recorded: Rays, quick: bool
 ) -> Iterator[report.Row]:
     """One row per caller, ours for every query there is."""
-    callers = [*(ours.caller(query, 1) for query in QUERIES if answered(query)), *rivals]
+    callers = [*(ours.by_scene(query, 1) for query in QUERIES if answered(query)), *rivals]
+    callers += [caller for rival in rivals for caller in ours.counterparts(rival, 1) if caller.name != SCENE]
     parts = [(recorded.origins[i : i + 1], recorded.directions[i : i + 1]) for i in range(SINGLE_RAYS)]
     for caller in callers:
         calls = [lambda part=part, caller=caller: caller.call(*part) for part in parts]
@@ -142,7 +144,7 @@ def single_rows(
 
 def mean_rows(rows: Sequence[report.Row]) -> list[report.Row]:
     """Geometric mean and lowest ratio over scenes and kinds of rays, per rival and number of threads."""
-    keys = ("query", "other", "threads")
+    keys = ("query", "ours", "other", "threads")
     means = []
     for key in dict.fromkeys(tuple(row[name] for name in keys) for row in rows):
         group = [row for row in rows if tuple(row[name] for name in keys) == key]
@@ -160,12 +162,12 @@ def mean_rows(rows: Sequence[report.Row]) -> list[report.Row]:
 
 def draw(means: Sequence[report.Row]) -> Figure:
     """Bars of the mean ratio per rival, a colour per number of threads."""
-    rivals = list(dict.fromkeys(row["other"] for row in means))
+    rivals = list(dict.fromkeys(_label(row) for row in means))
     threads = list(dict.fromkeys(row["threads"] for row in means))
     figure, panel = pyplot.subplots(figsize=(9, 1.2 + 0.55 * len(rivals)), layout="constrained")
     height = 0.8 / len(threads)
     for i, number in enumerate(threads):
-        ratios = {row["other"]: row["mean"] for row in means if row["threads"] == number}
+        ratios = {_label(row): row["mean"] for row in means if row["threads"] == number}
         places = [rivals.index(name) + (i - (len(threads) - 1) / 2) * height for name in ratios]
         label = f"wive on {number} thread{'s' * (number > 1)}"
         bars = panel.barh(places, list(ratios.values()), height * 0.9, label=label, color=f"C{i}")
@@ -181,6 +183,10 @@ def draw(means: Sequence[report.Row]) -> Figure:
     panel.spines[["top", "right", "left"]].set_visible(False)
     panel.legend(frameon=False, fontsize=8)
     return figure
+
+
+def _label(row: report.Row) -> str:
+    return row["other"] if row["ours"] == SCENE else f"{row['other']}, against {row['ours']}"
 
 
 def parse_options(options: Sequence[str]) -> argparse.Namespace:

@@ -2,7 +2,8 @@
 
 import importlib.util
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -19,6 +20,7 @@ FIRST = "closest: prim alone"
 ANY = "any hit"
 LOCATION = "closest: point, ray, prim"
 ALL = "all hits: point, ray, prim"
+SCENE = "wive.Scene"
 QUERIES = (CLOSEST, FIRST, ANY, LOCATION, ALL)
 
 
@@ -30,6 +32,8 @@ class Caller:
     query: str
     call: Callable[[Array, Array], Any]
     hits: Callable[[Any], int]
+    method: str = ""  # of trimesh's intersector, for ours of that name
+    options: dict[str, bool] = field(default_factory=dict)
 
 
 def answered(query: str) -> bool:
@@ -38,14 +42,30 @@ def answered(query: str) -> bool:
 
 
 class Ours:
-    """wive's answer to every query, on a number of threads (None: all)."""
+    """wive's answer to every query, on a number of threads: by a scene and by the intersector for trimesh."""
 
-    def __init__(self, scene: wive.Scene) -> None:
-        """Answers by this scene."""
-        self.scene = scene
+    def __init__(self, mesh: Mesh) -> None:
+        """Answers for this mesh."""
+        self.mesh = mesh
+        self.scene = wive.Scene(mesh.vertices, mesh.faces)
+        self._drop_ins: dict[int, Any] = {}
 
-    def caller(self, query: str, threads: int | None) -> Caller:
-        """One query on so many threads."""
+    def counterparts(self, rival: Caller, threads: int) -> Iterator[Caller]:
+        """What a user would call in place of a rival."""
+        yield self.by_scene(rival.query, threads)
+        if rival.method and importlib.util.find_spec("wive.trimesh"):
+            bound = getattr(self._drop_in(threads), rival.method)
+            call = partial(bound, **rival.options)
+            yield Caller("wive.trimesh", rival.query, call, rival.hits)
+
+    def _drop_in(self, threads: int) -> Any:
+        if threads not in self._drop_ins:
+            adapter: Any = importlib.import_module("wive.trimesh")
+            self._drop_ins[threads] = adapter.RayMeshIntersector(_as_trimesh(self.mesh), threads=threads)
+        return self._drop_ins[threads]
+
+    def by_scene(self, query: str, threads: int) -> Caller:
+        """One query on so many threads, by `wive.Scene`."""
         scene: Any = self.scene
 
         def intersect(origins: Array, directions: Array) -> Any:
@@ -74,7 +94,7 @@ class Ours:
             LOCATION: (location, lambda found: len(found[2])),
             ALL: (every, lambda found: len(found[2])),
         }
-        return Caller("wive", query, *ways[query])
+        return Caller(SCENE, query, *ways[query])
 
 
 def others(mesh: Mesh) -> Iterator[Caller]:
@@ -121,26 +141,25 @@ def _embreex(mesh: Mesh) -> Iterator[Caller]:
 def _trimesh(mesh: Mesh) -> Iterator[Caller]:
     if importlib.util.find_spec("embreex") is None:
         return
-    import trimesh
     from trimesh.ray.ray_pyembree import RayMeshIntersector
 
-    intersector: Any = RayMeshIntersector(trimesh.Trimesh(mesh.vertices, mesh.faces, process=False))
-    yield Caller(
-        "trimesh intersects_first",
-        FIRST,
-        intersector.intersects_first,
-        lambda prim: int(np.count_nonzero(prim >= 0)),
-    )
-    yield Caller("trimesh intersects_any", ANY, intersector.intersects_any, np.count_nonzero)
-    for query, multiple in ((LOCATION, False), (ALL, True)):
-        yield Caller(
-            f"trimesh intersects_location(multiple_hits={multiple})",
-            query,
-            lambda origins, directions, multiple=multiple: intersector.intersects_location(  # type: ignore[misc]
-                origins, directions, multiple_hits=multiple
-            ),
-            lambda found: len(found[2]),
-        )
+    intersector: Any = RayMeshIntersector(_as_trimesh(mesh))
+
+    def caller(query: str, method: str, hits: Callable[[Any], int], **options: bool) -> Caller:
+        given = ", ".join(f"{name}={value}" for name, value in options.items())
+        name = f"trimesh {method}({given})" if given else f"trimesh {method}"
+        return Caller(name, query, partial(getattr(intersector, method), **options), hits, method, options)
+
+    yield caller(FIRST, "intersects_first", lambda prim: int(np.count_nonzero(prim >= 0)))
+    yield caller(ANY, "intersects_any", lambda mask: int(np.count_nonzero(mask)))
+    yield caller(LOCATION, "intersects_location", lambda found: len(found[2]), multiple_hits=False)
+    yield caller(ALL, "intersects_location", lambda found: len(found[2]), multiple_hits=True)
+
+
+def _as_trimesh(mesh: Mesh) -> Any:
+    import trimesh
+
+    return trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
 
 
 def _warp(mesh: Mesh) -> Iterator[Caller]:

@@ -49,6 +49,11 @@ class Effort:
 QUICK = Effort(least=2, most=2)
 
 
+def core_count() -> int:
+    """Cores that this process may run on."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
 @contextmanager
 def one_core() -> Iterator[None]:
     """Pins the calling thread to the last core it may run on, where the system knows how."""
