@@ -8,6 +8,7 @@
 #include <span>
 #include <stdexcept>
 #include <string>
+#include <utility>
 
 #include "builder.h"
 #include "dispatch.h"
@@ -59,7 +60,8 @@ NodeForm parse_nodes(const std::string& name) {
 ChildOrder parse_order(const std::string& name) {
     if (name == "treelet") return ChildOrder::treelet;
     if (name == "diagonal") return ChildOrder::diagonal;
-    expect(name == "none", "order: expected 'treelet', 'diagonal' or 'none'");
+    if (name == "slots") return ChildOrder::slots;
+    expect(name == "none", "order: expected 'treelet', 'diagonal', 'slots' or 'none'");
     return ChildOrder::none;
 }
 
@@ -193,9 +195,16 @@ py::tuple intersect_all(const PyBvh& self, const std::string& kernel, const Arra
     return py::make_tuple(std::move(offsets), std::move(t), std::move(prim), std::move(uv), std::move(steps));
 }
 
+// Function and context as ctypes gives their addresses.
+ForeignTracer foreign_tracer(const std::optional<std::pair<std::uintptr_t, std::uintptr_t>>& addresses) {
+    if (!addresses) return {};
+    return {reinterpret_cast<ForeignTracer::Function>(addresses->first), reinterpret_cast<const void*>(addresses->second)};
+}
+
 std::uint64_t render(const PyBvh& self, const std::string& kernel, const Array<float>& camera, Array<float> image,
                      int row_begin, int row_end, int samples, int bounces, const std::string& albedo, std::uint32_t seed,
-                     unsigned threads) {
+                     unsigned threads, unsigned in_flight,
+                     std::optional<std::pair<std::uintptr_t, std::uintptr_t>> tracer) {
     expect(camera.ndim() == 2 && camera.shape(0) == 4 && camera.shape(1) == 3, "camera: expected shape (4, 3)");
     expect(image.ndim() == 3 && image.shape(2) == 3, "image: expected shape (height, width, 3)");
     expect(0 <= row_begin && row_begin <= row_end && row_end <= image.shape(0), "rows: expected a range within the image");
@@ -214,7 +223,9 @@ std::uint64_t render(const PyBvh& self, const std::string& kernel, const Array<f
                            bounces,
                            albedo == "normals" ? Albedo::normals : Albedo::gray,
                            seed,
-                           image.mutable_data()};
+                           image.mutable_data(),
+                           in_flight,
+                           foreign_tracer(tracer)};
     py::gil_scoped_release release;
     check_mesh(job.mesh, thread_count(threads));  // its arrays are the caller's, who may have changed them since
     return render_rows(job, row_begin, row_end, thread_count(threads));
@@ -308,5 +319,5 @@ PYBIND11_MODULE(_cpu, m, py::mod_gil_not_used()) {
              array("tmax"), py::arg("threads") = 0, py::arg("in_flight") = 0, py::arg("stats") = false)
         .def("render_rows", &render, py::arg("kernel"), array("camera"), array("image"), py::arg("row_begin"),
              py::arg("row_end"), py::arg("samples"), py::arg("bounces"), py::arg("albedo"), py::arg("seed") = 0,
-             py::arg("threads") = 0);
+             py::arg("threads") = 0, py::arg("in_flight") = 0, py::arg("tracer") = py::none());
 }

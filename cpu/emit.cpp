@@ -196,6 +196,7 @@ private:
         }
         const SlotSequences order = options_.order == ChildOrder::treelet    ? treelet.order
                                     : options_.order == ChildOrder::diagonal ? sort_along_diagonals(node, treelet.count)
+                                    : options_.order == ChildOrder::slots    ? assign_places(node, treelet.count)
                                                                              : shuffle(node, treelet.count);
         write_order(node, order, treelet.count);
         Writer::write_node(node, treelet.count, out);

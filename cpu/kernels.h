@@ -56,6 +56,7 @@ struct KernelTable {
 // Null where this build has no such kernels; whether the machine can run them is dispatch.h's business.
 const KernelTable* avx512_full_kernels();
 const KernelTable* avx512_half_kernels();
+const KernelTable* avx512_by_distance_kernels();
 const KernelTable* avx2_kernels();
 const KernelTable* scalar_kernels();
 const KernelTable* scalar_by_distance_kernels();

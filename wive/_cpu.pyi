@@ -14,7 +14,8 @@ compiler: str  # the C++ compiler's name and version
 def kernels() -> dict[str, str]:
     """Every traversal kernel compiled in, best first, and why this machine can't run it ("" where it can).
 
-    Names: "avx512" (the better of the two forms below), "avx512.full", "avx512.half", "avx2", "scalar".
+    Names: "avx512" (the better of the two forms below), "avx512.full", "avx512.half", "avx2", "scalar"; and,
+    sorting children by distance for comparisons, "avx512.distance" and "scalar.distance".
     """
 
 class Bvh:
@@ -25,7 +26,7 @@ class Bvh:
         vertices: NDArray[np.float32],
         faces: NDArray[np.int32],
         accuracy: Literal["fast", "watertight", "exact"] = "watertight",
-        order: Literal["treelet", "diagonal", "none"] = "treelet",
+        order: Literal["treelet", "diagonal", "slots", "none"] = "treelet",
         threads: int = 0,
         depth_limit: int = 64,
         nodes: Literal["float32", "compressed"] = "float32",
@@ -151,11 +152,14 @@ class Bvh:
         albedo: Literal["gray", "normals"],
         seed: int = 0,
         threads: int = 0,
+        in_flight: int = 0,
+        tracer: tuple[int, int] | None = None,
     ) -> int:
         """Path-trace rows [row_begin, row_end) of image (height,width,3) in place; returns the rays traced.
 
         camera (4,3): eye, then the vectors from the eye to the picture's centre, from its centre to the right
         edge's middle, and from its centre to the top edge's middle. Linear radiance under a white sky of
         radiance 1. Random numbers come from (pixel, sample, bounce) alone, so a picture does not depend on
-        threads or kernel.
+        threads or kernel. tracer: addresses of a C function that traces in the kernel's place and of its
+        context (ForeignTracer in cpu/render.h), for comparisons.
         """
