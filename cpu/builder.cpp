@@ -4,7 +4,6 @@
 #include <cmath>
 #include <limits>
 #include <stdexcept>
-#include <utility>
 
 #include "binary_tree.h"
 #include "emit.h"
@@ -16,15 +15,12 @@ Bvh::Bvh(const Mesh& mesh, const BuildOptions& options) : accuracy_(options.accu
     const unsigned threads = thread_count(options.threads);
     if (mesh.face_count >= leaf_bit) throw std::invalid_argument("faces: too many triangles for one scene");
     check_mesh(mesh, threads);
-    std::size_t count = 0;
-    LargeArray<PrimRef> refs = make_prim_refs(mesh, threads, count);
-    const BinaryTree tree =
-        build_binary_tree(std::move(refs), static_cast<std::uint32_t>(count), threads, options.depth_limit);
+    const BinaryTree tree = build_binary_tree(make_prim_refs(mesh, threads), threads, options.depth_limit);
     for (std::size_t axis = 0; axis < 3; ++axis) {
         bounds_[0][axis] = tree.box.lo[axis];
         bounds_[1][axis] = tree.box.hi[axis];
     }
-    if (count > 0) {
+    if (tree.count > 0) {
         // Far from the origin, planes relative to the middle keep the boxes' slack small. Near it, the planes
         // are left as they are, and so stay exact.
         const Float4v middle = tree.box.lo * 0.5f + tree.box.hi * 0.5f;

@@ -6,28 +6,33 @@
 #pragma once
 
 #include <array>
-#include <vector>
+#include <cstddef>
 
 #include "binary_tree.h"
 #include "order.h"
 
 namespace wive {
 
-using SlotCosts = std::array<float, node_width + 1>;
+// Costs with one to eight slots, never rising: lanes of two vectors.
+struct SlotCosts {
+    Float4v first, second;  // 1 to 4, 5 to 8
+    bool one_block;         // all alike
+};
 
 // Costs of a range small enough for one block: one slot is enough, more don't help.
 inline SlotCosts block_costs(const Box& box) {
-    SlotCosts costs;
-    costs.fill(box.half_area() * block_cost);
-    return costs;
+    const Float4v cost = Float4v{} + box.half_area() * block_cost;
+    return {cost, cost, true};
 }
 
-// Fills in node.share and returns the node's costs.
-SlotCosts gather_costs(BinaryNode& node, const Box& box, const SlotCosts& left, const SlotCosts& right);
+// The best way to gather a subtree of so many blocks, half its box's area, from what its sides cost; `costs` is set to
+// its own.
+Choices gather(std::uint32_t blocks, float half_area, const SlotCosts& left, const SlotCosts& right, int axis,
+               SlotCosts& costs);
 
-// A wide node's child: the references [begin, end), as a leaf or, at its binary split position, as a wide node.
+// A wide node's child: as a leaf or as a wide node.
 struct Slot {
-    std::uint32_t begin, end, split;
+    Subtree tree;
     bool leaf;
 };
 
@@ -37,9 +42,15 @@ struct Treelet {
     SlotSequences order;
 };
 
-// The treelet that the dynamic programme chose for the wide node over the whole range of `split`.
-Treelet gather_treelet(const BinaryTree& tree, std::uint32_t split);
+// The treelet that the dynamic programme chose for the wide node over a whole subtree that has a node.
+Treelet gather_treelet(const BinaryTree& tree, const Subtree& top);
 // The same for the root, which is a wide node even over a single block.
 Treelet gather_root(const BinaryTree& tree);
+
+// Wide nodes and blocks below a slot, without the slot's own node.
+struct TreeSize {
+    std::size_t nodes = 0, blocks = 0;
+};
+TreeSize measure(const BinaryTree& tree, const Slot& slot);
 
 }  // namespace wive

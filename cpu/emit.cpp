@@ -30,19 +30,17 @@ public:
     Emitter(const BinaryTree& tree, const Mesh& mesh, const BuildOptions& options, const std::array<float, 3>& center)
         : tree_(tree), mesh_(mesh), options_(options), center_(center) {}
 
-    struct Size {
-        std::size_t nodes = 0, blocks = 0;
-    };
+    using Size = TreeSize;
 
     EmittedTree emit(unsigned threads) {
         // First the top of the tree, which only plans; then each subtree below it, at a place known by its size.
         const Treelet root = gather_root(tree_);
-        std::vector<Subtree> subtrees;
+        std::vector<Part> subtrees;
         Size top = {1, 0};
         plan_top(root, top, subtrees);
-        parallel_for(subtrees.size(), threads, [&](std::size_t i) { subtrees[i].size = measure(subtrees[i].slot); });
+        parallel_for(subtrees.size(), threads, [&](std::size_t i) { subtrees[i].size = measure(tree_, subtrees[i].slot); });
         Size total = top;
-        for (Subtree& subtree : subtrees) {
+        for (Part& subtree : subtrees) {
             subtree.first = total;
             total.nodes += subtree.size.nodes;
             total.blocks += subtree.size.blocks;
@@ -70,7 +68,7 @@ public:
 
 private:
     // A slot whose whole content one thread emits; its own node's place was given by its parent.
-    struct Subtree {
+    struct Part {
         Slot slot;
         Size size, first;
         std::size_t node = 0;
@@ -84,34 +82,20 @@ private:
                           static_cast<std::uint32_t>(count));
     }
 
-    static bool is_top(const Slot& slot) { return !slot.leaf && slot.end - slot.begin > parallel_subtree; }
+    static bool is_top(const Slot& slot) { return !slot.leaf && slot.tree.size() > parallel_subtree; }
 
-    void plan_top(const Treelet& treelet, Size& top, std::vector<Subtree>& subtrees) const {
+    void plan_top(const Treelet& treelet, Size& top, std::vector<Part>& subtrees) const {
         for (int i = 0; i < treelet.count; ++i) top.nodes += treelet.slots[static_cast<std::size_t>(i)].leaf ? 0 : 1;
         for (int i = 0; i < treelet.count; ++i) {
             const Slot& slot = treelet.slots[static_cast<std::size_t>(i)];
             if (is_top(slot))
-                plan_top(gather_treelet(tree_, slot.split), top, subtrees);
+                plan_top(gather_treelet(tree_, slot.tree), top, subtrees);
             else
                 subtrees.push_back({slot, {}, {}, 0, 0});
         }
     }
 
-    // Nodes and blocks below a slot, without the slot's own node.
-    Size measure(const Slot& slot) const {
-        if (slot.leaf) return {0, blocks_for(slot.end - slot.begin)};
-        const Treelet treelet = gather_treelet(tree_, slot.split);
-        Size size;
-        for (int i = 0; i < treelet.count; ++i) {
-            const Slot& child = treelet.slots[static_cast<std::size_t>(i)];
-            const Size below = measure(child);
-            size.nodes += below.nodes + (child.leaf ? 0 : 1);
-            size.blocks += below.blocks;
-        }
-        return size;
-    }
-
-    int emit_top(const Treelet& treelet, std::size_t place, Size& cursor, std::vector<Subtree>& subtrees,
+    int emit_top(const Treelet& treelet, std::size_t place, Size& cursor, std::vector<Part>& subtrees,
                  std::size_t& next_subtree) {
         std::size_t child_node = cursor.nodes;
         for (int i = 0; i < treelet.count; ++i) cursor.nodes += treelet.slots[static_cast<std::size_t>(i)].leaf ? 0 : 1;
@@ -123,10 +107,10 @@ private:
             if (is_top(slot)) {
                 children[static_cast<std::size_t>(i)] = node_child(node);
                 const std::size_t first = next_subtree;
-                deepest = std::max(deepest, emit_top(gather_treelet(tree_, slot.split), node, cursor, subtrees, next_subtree));
+                deepest = std::max(deepest, emit_top(gather_treelet(tree_, slot.tree), node, cursor, subtrees, next_subtree));
                 for (std::size_t k = first; k < next_subtree; ++k) ++subtrees[k].depth;
             } else {
-                Subtree& subtree = subtrees[next_subtree++];
+                Part& subtree = subtrees[next_subtree++];
                 subtree.node = node;
                 subtree.depth = 1;
                 children[static_cast<std::size_t>(i)] =
@@ -139,7 +123,7 @@ private:
 
     // Returns the depth of the subtree, its root counted.
     int emit_subtree(const Slot& slot, std::size_t place, Size& cursor) {
-        const Treelet treelet = gather_treelet(tree_, slot.split);
+        const Treelet treelet = gather_treelet(tree_, slot.tree);
         Children children{};
         std::size_t child_node = cursor.nodes;
         for (int i = 0; i < treelet.count; ++i) {
@@ -156,14 +140,9 @@ private:
     }
 
     Box box_of(const Slot& slot) const {
+        if (slot.tree.has_node()) return tree_.box_of(slot.tree);
         Box box;
-        if (!slot.leaf || slot.end - slot.begin > block_width) {
-            const BinaryNode& node = tree_.nodes[slot.split];
-            box.lo = Float4v{node.lo[0], node.lo[1], node.lo[2], 0};
-            box.hi = Float4v{node.hi[0], node.hi[1], node.hi[2], 0};
-            return box;
-        }
-        for (std::uint32_t i = slot.begin; i < slot.end; ++i) box.grow(tree_.refs[i].box());
+        for (std::uint32_t i = slot.tree.begin; i < slot.tree.end; ++i) box.grow(tree_.refs[i].box());
         return box;
     }
 
@@ -187,8 +166,8 @@ private:
     std::uint32_t write_leaf(const Slot& slot, Size& cursor) const {
         const std::size_t first = cursor.blocks;
         std::array<std::uint32_t, block_width * max_leaf_blocks> prims;
-        const std::uint32_t count = slot.end - slot.begin;
-        for (std::uint32_t i = 0; i < count; ++i) prims[i] = tree_.refs[slot.begin + i].prim();
+        const std::uint32_t count = slot.tree.size();
+        for (std::uint32_t i = 0; i < count; ++i) prims[i] = tree_.refs[slot.tree.begin + i].prim();
         std::sort(prims.begin(), prims.begin() + count);
         for (std::uint32_t i = 0; i < count; i += block_width) {
             TriangleBlock& block = blocks_[cursor.blocks++];

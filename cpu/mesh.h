@@ -29,7 +29,6 @@ struct PrimRef {
     Box box() const { return {lo, hi}; }
     // Twice the box's centre. The number's bits are cleared first: as a float they would be a slow denormal.
     Float4v centroid() const {
-        typedef std::int32_t Int4v __attribute__((vector_size(16)));
         const Int4v xyz = {-1, -1, -1, 0};
         return std::bit_cast<Float4v>(std::bit_cast<Int4v>(lo) & xyz) + hi;
     }
@@ -39,7 +38,13 @@ struct PrimRef {
 // points outside the vertices.
 void check_mesh(const Mesh& mesh, unsigned threads);
 
+struct PrimRefs {
+    LargeArray<PrimRef> refs;
+    std::uint32_t count = 0;
+    Box box, centroids;  // round all of them
+};
+
 // One reference for each triangle with an area; zero-area triangles can't be hit and are left out.
-LargeArray<PrimRef> make_prim_refs(const Mesh& mesh, unsigned threads, std::size_t& count);
+PrimRefs make_prim_refs(const Mesh& mesh, unsigned threads);
 
 }  // namespace wive
