@@ -64,8 +64,7 @@ public:
         });
         parallel_for(tasks.size(), threads_, [&](std::size_t i) {
             Item& item = items_[tasks[i]];
-            fetch(item);
-            item.costs = build_range(item.range);
+            item.costs = build_range(item.range, item.in_scratch);
         });
         for (std::size_t i = items_.size(); i-- > 0;) {
             Item& item = items_[i];
@@ -91,8 +90,7 @@ private:
         items_.resize(first + 2 * large.size());
         parallel_for(large.size(), threads_, [&](std::size_t i) {
             Item& item = items_[large[i]];
-            fetch(item);
-            const Halves halves = split_alone(item.range);
+            const Halves halves = split_alone(item.range, item.in_scratch);
             item.left = first + 2 * i;
             item.axis = halves.axis;
             items_[item.left] = {halves.left, false};
@@ -101,11 +99,11 @@ private:
         return !large.empty();
     }
 
-    // Has the item's references in tree.refs.
-    void fetch(Item& item) const {
-        const Subtree& r = item.range.tree;
-        if (item.in_scratch) std::copy(tree_.nodes.data() + r.begin, tree_.nodes.data() + r.end, tree_.refs.data() + r.begin);
-        item.in_scratch = false;
+    // Brings a range's references to tree.refs.
+    PrimRef* fetch(const Range& range, bool from_scratch) const {
+        const Subtree& r = range.tree;
+        if (from_scratch) std::copy(tree_.nodes.data() + r.begin, tree_.nodes.data() + r.end, tree_.refs.data() + r.begin);
+        return tree_.refs.data();
     }
 
     // Whether SAH may still choose: halving must be able to finish within the depth that is left.
@@ -123,9 +121,12 @@ private:
     }
 
     // Builds the subtree over a range on this thread.
-    SlotCosts build_range(const Range& range) {
-        if (!range.tree.has_node()) return block_costs(range.box);
-        const Halves halves = split_alone(range);
+    SlotCosts build_range(const Range& range, bool from_scratch = false) {
+        if (!range.tree.has_node()) {
+            fetch(range, from_scratch);
+            return block_costs(range.box);
+        }
+        const Halves halves = split_alone(range, from_scratch);
         const SlotCosts left = build_range(halves.left);
         const SlotCosts right = build_range(halves.right);
         return store_node(range, left, right, halves.right.tree.begin, halves.axis);
@@ -169,20 +170,22 @@ private:
         }
     }
 
-    Halves split_alone(const Range& range) const {
-        PrimRef* refs = tree_.refs.data();
-        if (!may_choose(range)) return split_by_number(range, refs);
+    // Leaves both sides in tree.refs.
+    Halves split_alone(const Range& range, bool from_scratch) const {
+        if (!may_choose(range)) return split_by_number(range, fetch(range, from_scratch));
         const auto [begin, end, place] = range.tree;
+        PrimRef *refs = tree_.refs.data(), *scratch = tree_.nodes.data();
+        const PrimRef* from = from_scratch ? scratch : refs;
         const BinMap bin_of(range);
         Bins bins(bin_of.count);
-        bins.add(refs + begin, refs + end, bin_of);
+        bins.add(from + begin, from + end, bin_of);
         const Split split = best_split(bins, bin_of);
-        if (split.axis < 0) return split_by_number(range, refs);
-        PrimRef *left = refs + begin, *right = tree_.nodes.data() + begin;
-        partition(refs + begin, refs + end, bin_of, split, left, right);
+        if (split.axis < 0) return split_by_number(range, fetch(range, from_scratch));
+        PrimRef *left = refs + begin, *right = scratch + begin;
+        partition(from + begin, from + end, bin_of, split, left, right);
         Halves halves(range, static_cast<std::uint32_t>(left - refs), split.axis);
         for (const PrimRef* ref = refs + begin; ref < left; ++ref) halves.left.grow(*ref);
-        for (const PrimRef* ref = tree_.nodes.data() + begin; ref < right; ++ref) {
+        for (const PrimRef* ref = scratch + begin; ref < right; ++ref) {
             halves.right.grow(*ref);
             *left++ = *ref;
         }
@@ -233,7 +236,13 @@ private:
 
     static void partition_chunk(const PrimRef* begin, const PrimRef* end, const BinMap& bin_of, Split split,
                                 std::array<PrimRef*, 2> to) {
-        for (const PrimRef* ref = begin; ref < end; ++ref) *to[!bin_of.goes_left(*ref, split)]++ = *ref;
+        auto [left, right] = to;
+        for (const PrimRef* ref = begin; ref < end; ++ref) {
+            const bool goes_left = bin_of.goes_left(*ref, split);
+            *(goes_left ? left : right) = *ref;
+            left += goes_left;
+            right += !goes_left;
+        }
     }
 
     BinaryTree& tree_;
