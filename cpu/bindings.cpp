@@ -50,16 +50,23 @@ ChildOrder parse_order(const std::string& name) {
     return ChildOrder::none;
 }
 
+Quality parse_quality(const std::string& name) {
+    if (name == "high") return Quality::high;
+    expect(name == "medium", "quality: expected 'medium' or 'high'");
+    return Quality::medium;
+}
+
 // The tree together with the arrays it was built from, which rendering reads.
 class PyBvh {
 public:
     PyBvh(Array<float> vertices, Array<std::int32_t> faces, const std::string& accuracy, const std::string& order,
-          unsigned threads, int depth_limit)
+          unsigned threads, int depth_limit, const std::string& quality)
         : vertices_(std::move(vertices)), faces_(std::move(faces)) {
         expect_shape(vertices_, 3, "vertices: expected shape (v, 3)");
         expect_shape(faces_, 3, "faces: expected shape (f, 3)");
         expect(depth_limit >= 1 && depth_limit <= max_depth, "depth_limit: expected 1 to 64");
-        const BuildOptions options = {parse_accuracy(accuracy), parse_order(order), threads, depth_limit};
+        const BuildOptions options = {parse_accuracy(accuracy), parse_order(order), threads, depth_limit,
+                                      parse_quality(quality)};
         const Mesh view = mesh();
         py::gil_scoped_release release;
         bvh_ = std::make_unique<Bvh>(view, options);
@@ -189,9 +196,10 @@ PYBIND11_MODULE(_cpu, m, py::mod_gil_not_used()) {
     });
     const auto array = [](const char* name) { return py::arg(name).noconvert(); };
     py::class_<PyBvh>(m, "Bvh")
-        .def(py::init<Array<float>, Array<std::int32_t>, const std::string&, const std::string&, unsigned, int>(),
+        .def(py::init<Array<float>, Array<std::int32_t>, const std::string&, const std::string&, unsigned, int,
+                      const std::string&>(),
              array("vertices"), array("faces"), py::arg("accuracy") = "watertight", py::arg("order") = "treelet",
-             py::arg("threads") = 0, py::arg("depth_limit") = max_depth)
+             py::arg("threads") = 0, py::arg("depth_limit") = max_depth, py::arg("quality") = "medium")
         .def_property_readonly("nodes", [](py::object self) {
             const auto nodes = self.cast<const PyBvh&>().bvh().nodes();
             return view(self, {static_cast<py::ssize_t>(nodes.size()), 8, 8},

@@ -8,6 +8,7 @@
 #include "binary_tree.h"
 #include "emit.h"
 #include "parallel.h"
+#include "reinsertion.h"
 
 namespace wive {
 
@@ -15,7 +16,8 @@ Bvh::Bvh(const Mesh& mesh, const BuildOptions& options) : accuracy_(options.accu
     const unsigned threads = thread_count(options.threads);
     if (mesh.face_count >= leaf_bit) throw std::invalid_argument("faces: too many triangles for one scene");
     check_mesh(mesh, threads);
-    const BinaryTree tree = build_binary_tree(make_prim_refs(mesh, threads), threads, options.depth_limit);
+    BinaryTree tree = build_binary_tree(make_prim_refs(mesh, threads), threads, options.depth_limit);
+    if (options.quality == Quality::high) optimize_by_reinsertion(tree, threads);
     for (std::size_t axis = 0; axis < 3; ++axis) {
         bounds_[0][axis] = tree.box.lo[axis];
         bounds_[1][axis] = tree.box.hi[axis];
@@ -33,6 +35,10 @@ Bvh::Bvh(const Mesh& mesh, const BuildOptions& options) : accuracy_(options.accu
         }
     }
     EmittedTree emitted = emit_tree(tree, mesh, options, center_, threads);
+    if (emitted.depth > options.depth_limit) {  // reinsertion knows no limit, binning does
+        tree = build_binary_tree(make_prim_refs(mesh, threads), threads, options.depth_limit);
+        emitted = emit_tree(tree, mesh, options, center_, threads);
+    }
     units_ = std::move(emitted.units);
     node_count_ = emitted.node_count;
     block_count_ = emitted.block_count;

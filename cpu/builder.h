@@ -12,11 +12,15 @@
 
 namespace wive {
 
+// medium: binned SAH. high: the same tree optimised further, for several times the build time.
+enum class Quality { medium, high };
+
 struct BuildOptions {
     Accuracy accuracy = Accuracy::watertight;
     ChildOrder order = ChildOrder::treelet;
     unsigned threads = 0;  // 0: every core
     int depth_limit = max_depth;
+    Quality quality = Quality::medium;
 };
 
 class Bvh {

@@ -28,6 +28,7 @@ class Bvh:
         order: Literal["treelet", "diagonal", "none"] = "treelet",
         threads: int = 0,
         depth_limit: int = 64,
+        quality: Literal["medium", "high"] = "medium",
     ) -> None:
         """Build over vertices (v,3), faces (f,3). threads 0 means every core.
 

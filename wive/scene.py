@@ -40,6 +40,7 @@ class Scene:
         device: str | None = None,
         accuracy: Literal["fast", "watertight"] = "watertight",
         nodes: Literal["float32"] = "float32",
+        quality: Literal["medium", "high"] = "medium",
     ) -> None:
         """Build the tree.
 
@@ -52,6 +53,8 @@ class Scene:
                 device, else "cpu". A device alone implies backend "warp"; CPU backends take none.
             accuracy: "watertight" (rays never slip between triangles that share an edge or vertex) or "fast".
             nodes: "float32".
+            quality: "medium", or "high" for a tree that takes two to four times as long to build and answers the
+                same in fewer steps: a sixth fewer among large and small triangles, none in even meshes.
 
         C-contiguous float32 vertices and int32 faces are kept, not copied: don't change them afterwards.
 
@@ -60,11 +63,16 @@ class Scene:
         """
         arguments.choice("accuracy", accuracy, ("fast", "watertight"))
         arguments.choice("nodes", nodes, ("float32",))
-        self._options = Options(backend=backend, device=device, accuracy=accuracy, nodes=nodes)
+        arguments.choice("quality", quality, ("medium", "high"))
+        self._options = Options(
+            backend=backend, device=device, accuracy=accuracy, nodes=nodes, quality=quality
+        )
         self._backend, self._device = resolve_backend(backend, device)
         mesh = arguments.mesh(host_array("vertices", vertices), host_array("faces", faces))
         self._vertices, self._faces = map(_read_only, mesh)
-        self._bvh = _cpu.Bvh(self._vertices, self._faces, accuracy, threads=available_threads())
+        self._bvh = _cpu.Bvh(
+            self._vertices, self._faces, accuracy, threads=available_threads(), quality=quality
+        )
         if self._device is not None:
             from wive.warp_tracer import WarpTracer
 
