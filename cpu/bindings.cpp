@@ -65,14 +65,25 @@ public:
         expect_shape(vertices_, 3, "vertices: expected shape (v, 3)");
         expect_shape(faces_, 3, "faces: expected shape (f, 3)");
         expect(depth_limit >= 1 && depth_limit <= max_depth, "depth_limit: expected 1 to 64");
-        const BuildOptions options = {parse_accuracy(accuracy), parse_order(order), threads, depth_limit,
-                                      parse_quality(quality)};
+        options_ = {parse_accuracy(accuracy), parse_order(order), threads, depth_limit, parse_quality(quality)};
         const Mesh view = mesh();
         py::gil_scoped_release release;
-        bvh_ = std::make_unique<Bvh>(view, options);
+        bvh_ = std::make_unique<Bvh>(view, options_);
+    }
+
+    // The same faces over moved vertices. Where the tree can't be kept it is built anew.
+    PyBvh(const PyBvh& other, Array<float> vertices, unsigned threads)
+        : vertices_(std::move(vertices)), faces_(other.faces_), options_(other.options_) {
+        expect_shape(vertices_, 3, "vertices: expected shape (v, 3)");
+        options_.threads = threads;
+        const Mesh view = mesh();
+        py::gil_scoped_release release;
+        bvh_ = other.bvh_->refitted(view, threads);
+        if (!bvh_) bvh_ = std::make_unique<Bvh>(view, options_);
     }
 
     const Bvh& bvh() const { return *bvh_; }
+    const Array<float>& vertices() const { return vertices_; }
     Mesh mesh() const {
         return {vertices_.data(), static_cast<std::size_t>(vertices_.shape(0)), faces_.data(),
                 static_cast<std::size_t>(faces_.shape(0))};
@@ -81,6 +92,7 @@ public:
 private:
     Array<float> vertices_;
     Array<std::int32_t> faces_;
+    BuildOptions options_;
     std::unique_ptr<Bvh> bvh_;
 };
 
@@ -200,6 +212,10 @@ PYBIND11_MODULE(_cpu, m, py::mod_gil_not_used()) {
                       const std::string&>(),
              array("vertices"), array("faces"), py::arg("accuracy") = "watertight", py::arg("order") = "treelet",
              py::arg("threads") = 0, py::arg("depth_limit") = max_depth, py::arg("quality") = "medium")
+        .def("refitted", [](const PyBvh& self, const Array<float>& vertices, unsigned threads) {
+            return std::make_unique<PyBvh>(self, vertices, threads);
+        }, array("vertices"), py::arg("threads") = 0)
+        .def_property_readonly("vertices", &PyBvh::vertices)
         .def_property_readonly("nodes", [](py::object self) {
             const auto nodes = self.cast<const PyBvh&>().bvh().nodes();
             return view(self, {static_cast<py::ssize_t>(nodes.size()), 8, 8},

@@ -9,6 +9,7 @@
 #include "emit.h"
 #include "parallel.h"
 #include "reinsertion.h"
+#include "write_node.h"
 
 namespace wive {
 
@@ -18,22 +19,8 @@ Bvh::Bvh(const Mesh& mesh, const BuildOptions& options) : accuracy_(options.accu
     check_mesh(mesh, threads);
     BinaryTree tree = build_binary_tree(make_prim_refs(mesh, threads), threads, options.depth_limit);
     if (options.quality == Quality::high) optimize_by_reinsertion(tree, threads);
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-        bounds_[0][axis] = tree.box.lo[axis];
-        bounds_[1][axis] = tree.box.hi[axis];
-    }
-    if (tree.count > 0) {
-        // Far from the origin, planes relative to the middle keep the boxes' slack small. Near it, the planes
-        // are left as they are, and so stay exact.
-        const Float4v middle = tree.box.lo * 0.5f + tree.box.hi * 0.5f;
-        const Float4v half = tree.box.hi * 0.5f - tree.box.lo * 0.5f;
-        const float size = std::max({half[0], half[1], half[2]});
-        for (std::size_t axis = 0; axis < 3; ++axis) {
-            center_[axis] = std::abs(middle[axis]) > 4 * size ? middle[axis] : 0.0f;
-            extent_[axis] = std::max(plane_above(bounds_[1][axis], center_[axis]),
-                                     -plane_below(bounds_[0][axis], center_[axis]));
-        }
-    }
+    triangle_count_ = tree.count;
+    set_bounds(tree.box);
     EmittedTree emitted = emit_tree(tree, mesh, options, center_, threads);
     if (emitted.depth > options.depth_limit) {  // reinsertion knows no limit, binning does
         tree = build_binary_tree(make_prim_refs(mesh, threads), threads, options.depth_limit);
@@ -43,6 +30,25 @@ Bvh::Bvh(const Mesh& mesh, const BuildOptions& options) : accuracy_(options.accu
     node_count_ = emitted.node_count;
     block_count_ = emitted.block_count;
     depth_ = emitted.depth;
+}
+
+void Bvh::set_bounds(const Box& box) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+        bounds_[0][axis] = box.lo[axis];
+        bounds_[1][axis] = box.hi[axis];
+    }
+    if (box.lo[0] <= box.hi[0]) {
+        // Far from the origin, planes relative to the middle keep the boxes' slack small. Near it, the planes
+        // are left as they are, and so stay exact.
+        const Float4v middle = box.lo * 0.5f + box.hi * 0.5f;
+        const Float4v half = box.hi * 0.5f - box.lo * 0.5f;
+        const float size = std::max({half[0], half[1], half[2]});
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+            center_[axis] = std::abs(middle[axis]) > 4 * size ? middle[axis] : 0.0f;
+            extent_[axis] = std::max(plane_above(bounds_[1][axis], center_[axis]),
+                                     -plane_below(bounds_[0][axis], center_[axis]));
+        }
+    }
 }
 
 BvhView Bvh::view() const {

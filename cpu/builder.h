@@ -3,8 +3,10 @@
 
 #include <array>
 #include <cstddef>
+#include <memory>
 #include <span>
 
+#include "box.h"
 #include "large_array.h"
 #include "layout.h"
 #include "mesh.h"
@@ -28,6 +30,10 @@ public:
     // Throws std::invalid_argument on a mesh that check_mesh refuses. The same tree whatever the threads.
     Bvh(const Mesh& mesh, const BuildOptions& options);
 
+    // The same tree over moved vertices; null where a triangle that had no area, and so no leaf, now has one. Throws as
+    // building does.
+    std::unique_ptr<Bvh> refitted(const Mesh& mesh, unsigned threads) const;
+
     BvhView view() const;
     std::size_t bytes() const { return units_.size(); }
     std::span<const Node> nodes() const { return {reinterpret_cast<const Node*>(units_.data()), node_count_}; }
@@ -45,9 +51,12 @@ public:
     Sah sah() const;
 
 private:
+    Bvh() = default;
+    void set_bounds(const Box& box);
+
     LargeArray<std::byte> units_;
-    std::size_t node_count_ = 0, block_count_ = 0;
-    Accuracy accuracy_;
+    std::size_t node_count_ = 0, block_count_ = 0, triangle_count_ = 0;
+    Accuracy accuracy_ = Accuracy::watertight;
     int depth_ = 0;
     std::array<float, 3> center_{}, extent_{};
     std::array<std::array<float, 3>, 2> bounds_{};

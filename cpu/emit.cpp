@@ -1,25 +1,15 @@
 #include "emit.h"
 
 #include <algorithm>
-#include <cmath>
-#include <limits>
 #include <stdexcept>
 #include <utility>
 #include <vector>
 
 #include "collapse.h"
 #include "parallel.h"
+#include "write_node.h"
 
 namespace wive {
-
-float plane_below(float plane, float center) {
-    const float p = plane - center;
-    return static_cast<double>(p) > static_cast<double>(plane) - center ? std::nextafter(p, -std::numeric_limits<float>::infinity()) : p;
-}
-float plane_above(float plane, float center) {
-    const float p = plane - center;
-    return static_cast<double>(p) < static_cast<double>(plane) - center ? std::nextafter(p, std::numeric_limits<float>::infinity()) : p;
-}
 
 namespace {
 
@@ -148,13 +138,7 @@ private:
 
     void write_node(Node& node, const Treelet& treelet, const Children& children) const {
         for (int i = 0; i < node_width; ++i) {
-            const bool used = i < treelet.count;
-            const Box box = used ? box_of(treelet.slots[static_cast<std::size_t>(i)]) : Box{};
-            for (int axis = 0; axis < 3; ++axis) {
-                const float center = center_[static_cast<std::size_t>(axis)];
-                node.planes[2 * axis][i] = used ? plane_below(box.lo[axis], center) : empty_plane;
-                node.planes[2 * axis + 1][i] = used ? plane_above(box.hi[axis], center) : -empty_plane;
-            }
+            write_box(node, i, i < treelet.count ? box_of(treelet.slots[static_cast<std::size_t>(i)]) : Box{}, center_);
             node.child[i] = children[static_cast<std::size_t>(i)];
         }
         const SlotSequences order = options_.order == ChildOrder::treelet    ? treelet.order
@@ -173,30 +157,10 @@ private:
             TriangleBlock& block = blocks_[cursor.blocks++];
             if (count - i < block_width) clear_block(block);
             for (std::uint32_t k = 0; k < std::min<std::uint32_t>(block_width, count - i); ++k)
-                write_triangle(block, k, prims[i + k]);
+                write_triangle(block, k, mesh_, prims[i + k], options_.accuracy);
         }
         return block_child(first, cursor.blocks - first);
     }
-
-    static void clear_block(TriangleBlock& block) {
-        for (auto& row : block.rows)
-            for (float& value : row) value = std::numeric_limits<float>::quiet_NaN();
-        for (std::int32_t& prim : block.prim) prim = -1;
-    }
-
-    void write_triangle(TriangleBlock& block, std::uint32_t lane, std::uint32_t prim) const {
-        for (int k = 0; k < 3; ++k) {
-            const float* corner = mesh_.corner(prim, k);
-            const float* first = mesh_.corner(prim, 0);
-            const bool edge = options_.accuracy == Accuracy::fast && k > 0;
-            for (int axis = 0; axis < 3; ++axis)
-                block.rows[3 * k + axis][lane] = edge ? corner[axis] - first[axis] : corner[axis];
-        }
-        block.prim[lane] = static_cast<std::int32_t>(prim);
-    }
-
-    // Larger than any plane with its slack, small enough that no arithmetic on it overflows.
-    static constexpr float empty_plane = 1e24f;
 
     const BinaryTree& tree_;
     const Mesh& mesh_;

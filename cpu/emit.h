@@ -22,8 +22,4 @@ struct EmittedTree {
 EmittedTree emit_tree(const BinaryTree& tree, const Mesh& mesh, const BuildOptions& options,
                       const std::array<float, 3>& center, unsigned threads);
 
-// Planes relative to the centre, rounded outwards so that a box never shrinks.
-float plane_below(float plane, float center);
-float plane_above(float plane, float center);
-
 }  // namespace wive

@@ -34,14 +34,14 @@ std::size_t first_bad(std::size_t count, unsigned threads, const HasBad& has_bad
     return first.load();
 }
 
-// Whether the three corners lie on one line, decided exactly: they do where all three projections have area zero.
-bool has_no_area(const float* a, const float* b, const float* c) {
+// Whether the three corners don't lie on one line, decided exactly: they do where all three projections have area zero.
+bool has_area(const float* a, const float* b, const float* c) {
     for (int k = 0; k < 3; ++k) {
         const int i = (k + 1) % 3, j = (k + 2) % 3;
         const float p[2] = {a[i], a[j]}, q[2] = {b[i], b[j]}, r[2] = {c[i], c[j]};
-        if (orientation(p, q, r) != 0) return false;
+        if (orientation(p, q, r) != 0) return true;
     }
-    return true;
+    return false;
 }
 
 // Settles it for most: some component of the cross product is larger than its rounding error. Differences and products
@@ -108,6 +108,14 @@ void check_mesh(const Mesh& mesh, unsigned threads) {
     }
 }
 
+bool box_triangle(const Mesh& mesh, std::size_t face, Box& box) {
+    const std::int32_t* corners = mesh.faces + 3 * face;
+    const Float4v a = load_vertex(mesh, corners[0]), b = load_vertex(mesh, corners[1]),
+                  c = load_vertex(mesh, corners[2]);
+    box = {minimum(minimum(a, b), c), maximum(maximum(a, b), c)};
+    return surely_has_area(a, b, c) || has_area(mesh.corner(face, 0), mesh.corner(face, 1), mesh.corner(face, 2));
+}
+
 PrimRefs make_prim_refs(const Mesh& mesh, unsigned threads) {
     PrimRefs all;
     all.refs = LargeArray<PrimRef>(mesh.face_count);
@@ -121,14 +129,11 @@ PrimRefs make_prim_refs(const Mesh& mesh, unsigned threads) {
         PrimRef* to = all.refs.data() + begin;
         Part part;
         for (std::size_t face = begin; face < end; ++face) {
-            const std::int32_t* corners = mesh.faces + 3 * face;
-            const Float4v a = load_vertex(mesh, corners[0]), b = load_vertex(mesh, corners[1]),
-                          c = load_vertex(mesh, corners[2]);
-            if (!surely_has_area(a, b, c) && has_no_area(mesh.corner(face, 0), mesh.corner(face, 1), mesh.corner(face, 2)))
-                continue;
-            PrimRef ref = {minimum(minimum(a, b), c), maximum(maximum(a, b), c)};
-            part.box.grow(ref.box());
-            part.centroids.grow(ref.lo + ref.hi);
+            Box box;
+            if (!box_triangle(mesh, face, box)) continue;
+            part.box.grow(box);
+            part.centroids.grow(box.lo + box.hi);
+            PrimRef ref = {box.lo, box.hi};
             ref.lo[3] = std::bit_cast<float>(static_cast<std::uint32_t>(face));
             *to++ = ref;
         }

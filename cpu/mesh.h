@@ -38,6 +38,9 @@ struct PrimRef {
 // points outside the vertices.
 void check_mesh(const Mesh& mesh, unsigned threads);
 
+// The box of a triangle; false where it has no area, decided exactly.
+bool box_triangle(const Mesh& mesh, std::size_t face, Box& box);
+
 struct PrimRefs {
     LargeArray<PrimRef> refs;
     std::uint32_t count = 0;

@@ -13,6 +13,7 @@ from wive.files import PathLike
 from wive.hits import Hits, Stats, WrappedHits
 from wive.meshfile import load_mesh
 from wive.rays import Rays, check_rays
+from wive.refit import Refittable
 from wive.storage import Options, read_scene, write_scene
 
 if TYPE_CHECKING:
@@ -22,13 +23,13 @@ if TYPE_CHECKING:
 LanesOption = Literal["auto", 8, 1]
 
 
-class Scene:
+class Scene(Refittable):
     """A triangle mesh that answers ray queries.
 
-    A scene never changes, so several threads may query it at once, and so may processes forked from this one.
+    Several threads may query it at once, and so may processes forked from this one. Only `refit` changes it,
+    all at once: a query sees the old positions or the new ones.
     """
 
-    _bvh: _cpu.Bvh
     _warp: "WarpTracer | None" = None
 
     def __init__(
@@ -53,8 +54,8 @@ class Scene:
                 device, else "cpu". A device alone implies backend "warp"; CPU backends take none.
             accuracy: "watertight" (rays never slip between triangles that share an edge or vertex) or "fast".
             nodes: "float32".
-            quality: "medium", or "high" for a tree that takes two to four times as long to build and answers the
-                same in fewer steps: a sixth fewer among large and small triangles, none in even meshes.
+            quality: "medium", or "high" for a tree that takes two to four times as long to build and gives
+                the same hits in fewer steps: a sixth fewer where triangles differ in size, none in an even mesh.
 
         C-contiguous float32 vertices and int32 faces are kept, not copied: don't change them afterwards.
 
@@ -69,14 +70,12 @@ class Scene:
         )
         self._backend, self._device = resolve_backend(backend, device)
         mesh = arguments.mesh(host_array("vertices", vertices), host_array("faces", faces))
-        self._vertices, self._faces = map(_read_only, mesh)
-        self._bvh = _cpu.Bvh(
-            self._vertices, self._faces, accuracy, threads=available_threads(), quality=quality
-        )
+        vertices, self._faces = map(arguments.read_only, mesh)
+        self._bvh = _cpu.Bvh(vertices, self._faces, accuracy, threads=available_threads(), quality=quality)
         if self._device is not None:
             from wive.warp_tracer import WarpTracer
 
-            self._warp = WarpTracer(self._bvh, self._vertices, self._faces, self._device)
+            self._warp = WarpTracer(self._bvh, vertices, self._faces, self._device)
 
     @classmethod
     def from_file(cls, path: PathLike, **kwargs: Any) -> "Scene":
@@ -150,8 +149,9 @@ class Scene:
         if self._warp is not None:
             hits, counts = self._warp.intersect(rays, chosen, bool(stats))
         else:
-            t, prim, uv, table = self._bvh.intersect(self._backend, *rays.numpy(), *work)
-            hits, counts = Hits(t, prim, uv, self._vertices, self._faces), _columns(table, rays)
+            bvh = self._bvh
+            t, prim, uv, table = bvh.intersect(self._backend, *rays.numpy(), *work)
+            hits, counts = Hits(t, prim, uv, bvh.vertices, self._faces), _columns(table, rays)
             if rays.library is not NUMPY:
                 hits = WrappedHits(hits, rays.library.from_numpy)
         return hits if counts is None else (hits, counts)
@@ -294,9 +294,3 @@ def _columns(table: NDArray[np.int32] | None, rays: Rays) -> Stats | None:
     if table is None:
         return None
     return Stats(*(rays.library.from_numpy(np.ascontiguousarray(column)) for column in table.T))
-
-
-def _read_only(array: NDArray[Any]) -> NDArray[Any]:
-    view = array.view(np.ndarray)
-    view.flags.writeable = False
-    return view
