@@ -13,7 +13,8 @@ namespace wive {
 
 namespace {
 
-constexpr std::uint32_t parallel_subtree = 1 << 14;  // subtrees of at most so many triangles are emitted by one thread
+// Subtrees that one thread emits: about so many, of so many triangles at most and at least.
+constexpr std::uint32_t subtree_count = 64, largest_subtree = 1 << 14, smallest_subtree = 1 << 10;
 
 class Emitter {
 public:
@@ -72,7 +73,7 @@ private:
                           static_cast<std::uint32_t>(count));
     }
 
-    static bool is_top(const Slot& slot) { return !slot.leaf && slot.tree.size() > parallel_subtree; }
+    bool is_top(const Slot& slot) const { return !slot.leaf && slot.tree.size() > subtree_size_; }
 
     void plan_top(const Treelet& treelet, Size& top, std::vector<Part>& subtrees) const {
         for (int i = 0; i < treelet.count; ++i) top.nodes += treelet.slots[static_cast<std::size_t>(i)].leaf ? 0 : 1;
@@ -166,6 +167,7 @@ private:
     const Mesh& mesh_;
     const BuildOptions& options_;
     const std::array<float, 3>& center_;
+    std::uint32_t subtree_size_ = std::clamp(tree_.count / subtree_count, smallest_subtree, largest_subtree);
     Node* nodes_ = nullptr;
     TriangleBlock* blocks_ = nullptr;
     std::size_t first_block_unit_ = 0;
