@@ -42,7 +42,7 @@ struct Item {
 // the right, and finally the nodes.
 class TreeBuilder {
 public:
-    TreeBuilder(BinaryTree& tree, unsigned threads, int depth_limit)
+    TreeBuilder(BinaryTree& tree, Threads& threads, int depth_limit)
         : tree_(tree), threads_(threads), depth_limit_(depth_limit) {}
 
     void build(const Box& centroids) {
@@ -247,13 +247,13 @@ private:
 
     BinaryTree& tree_;
     std::vector<Item> items_;
-    unsigned threads_;
+    Threads& threads_;
     int depth_limit_;
 };
 
 }  // namespace
 
-BinaryTree build_binary_tree(PrimRefs refs, unsigned threads, int depth_limit) {
+BinaryTree build_binary_tree(PrimRefs refs, Threads& threads, int depth_limit) {
     BinaryTree tree;
     tree.refs = std::move(refs.refs);
     tree.nodes = LargeArray<PrimRef>(refs.count);

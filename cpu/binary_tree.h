@@ -8,6 +8,7 @@
 #include "large_array.h"
 #include "layout.h"
 #include "mesh.h"
+#include "parallel.h"
 
 namespace wive {
 
@@ -74,6 +75,6 @@ struct BinaryTree {
 // Binned SAH, leaf cost counted in blocks of four. The same tree whatever the number of threads. At most depth_limit
 // levels deep: where the rest could be too deep, ranges are halved by number, which bit_width(blocks) levels finish.
 // box and centroids: of all references.
-BinaryTree build_binary_tree(PrimRefs refs, unsigned threads, int depth_limit);
+BinaryTree build_binary_tree(PrimRefs refs, Threads& threads, int depth_limit);
 
 }  // namespace wive

@@ -177,7 +177,8 @@ std::uint64_t render(const PyBvh& self, const std::string& kernel, const Array<f
                            seed,
                            image.mutable_data()};
     py::gil_scoped_release release;
-    check_mesh(job.mesh, thread_count(threads));  // its arrays are the caller's, who may have changed them since
+    Threads checkers(thread_count(threads));
+    check_mesh(job.mesh, checkers);  // its arrays are the caller's, who may have changed them since
     return render_rows(job, row_begin, row_end, thread_count(threads));
 }
 

@@ -14,7 +14,7 @@
 namespace wive {
 
 Bvh::Bvh(const Mesh& mesh, const BuildOptions& options) : accuracy_(options.accuracy) {
-    const unsigned threads = thread_count(options.threads);
+    Threads threads(thread_count(options.threads));
     if (mesh.face_count >= leaf_bit) throw std::invalid_argument("faces: too many triangles for one scene");
     check_mesh(mesh, threads);
     BinaryTree tree = build_binary_tree(make_prim_refs(mesh, threads), threads, options.depth_limit);

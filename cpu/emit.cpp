@@ -23,7 +23,7 @@ public:
 
     using Size = TreeSize;
 
-    EmittedTree emit(unsigned threads) {
+    EmittedTree emit(Threads& threads) {
         // First the top of the tree, which only plans; then each subtree below it, at a place known by its size.
         const Treelet root = gather_root(tree_);
         std::vector<Part> subtrees;
@@ -176,7 +176,7 @@ private:
 }  // namespace
 
 EmittedTree emit_tree(const BinaryTree& tree, const Mesh& mesh, const BuildOptions& options,
-                      const std::array<float, 3>& center, unsigned threads) {
+                      const std::array<float, 3>& center, Threads& threads) {
     return Emitter(tree, mesh, options, center).emit(threads);
 }
 

@@ -8,6 +8,7 @@
 #include "builder.h"
 #include "large_array.h"
 #include "mesh.h"
+#include "parallel.h"
 
 namespace wive {
 
@@ -20,6 +21,6 @@ struct EmittedTree {
 // Children of a node stand side by side, then subtree after subtree; the same on any number of threads. Throws
 // std::invalid_argument where the tree is larger than child references reach.
 EmittedTree emit_tree(const BinaryTree& tree, const Mesh& mesh, const BuildOptions& options,
-                      const std::array<float, 3>& center, unsigned threads);
+                      const std::array<float, 3>& center, Threads& threads);
 
 }  // namespace wive

@@ -19,7 +19,7 @@ constexpr std::size_t chunk_size = 1 << 14;
 
 // The lowest index in [0, count) for which is_bad holds, or count. Chunks are asked as a whole first, by has_bad.
 template <class HasBad, class IsBad>
-std::size_t first_bad(std::size_t count, unsigned threads, const HasBad& has_bad, const IsBad& is_bad) {
+std::size_t first_bad(std::size_t count, Threads& threads, const HasBad& has_bad, const IsBad& is_bad) {
     std::atomic<std::size_t> first{count};
     parallel_chunks(count, chunk_size, threads, [&](std::size_t begin, std::size_t end) {
         if (!has_bad(begin, end)) return;
@@ -70,7 +70,7 @@ Float4v load_vertex(const Mesh& mesh, std::int32_t index) {
 
 }  // namespace
 
-void check_mesh(const Mesh& mesh, unsigned threads) {
+void check_mesh(const Mesh& mesh, Threads& threads) {
     if (mesh.vertex_count > std::numeric_limits<std::int32_t>::max())
         throw std::invalid_argument("vertices: expected at most 2147483647, split the mesh into several scenes");
     // Without a branch, so that compilers take several at a time. Bits of magnitudes compare as the magnitudes do,
@@ -116,7 +116,7 @@ bool box_triangle(const Mesh& mesh, std::size_t face, Box& box) {
     return surely_has_area(a, b, c) || has_area(mesh.corner(face, 0), mesh.corner(face, 1), mesh.corner(face, 2));
 }
 
-PrimRefs make_prim_refs(const Mesh& mesh, unsigned threads) {
+PrimRefs make_prim_refs(const Mesh& mesh, Threads& threads) {
     PrimRefs all;
     all.refs = LargeArray<PrimRef>(mesh.face_count);
     const std::size_t chunks = (mesh.face_count + chunk_size - 1) / chunk_size;

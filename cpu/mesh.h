@@ -7,6 +7,7 @@
 
 #include "box.h"
 #include "large_array.h"
+#include "parallel.h"
 
 namespace wive {
 
@@ -36,7 +37,7 @@ struct PrimRef {
 
 // Throws std::invalid_argument naming the first vertex that is not a usable number, or the first face that
 // points outside the vertices.
-void check_mesh(const Mesh& mesh, unsigned threads);
+void check_mesh(const Mesh& mesh, Threads& threads);
 
 // The box of a triangle; false where it has no area, decided exactly.
 bool box_triangle(const Mesh& mesh, std::size_t face, Box& box);
@@ -48,6 +49,6 @@ struct PrimRefs {
 };
 
 // One reference for each triangle with an area; zero-area triangles can't be hit and are left out.
-PrimRefs make_prim_refs(const Mesh& mesh, unsigned threads);
+PrimRefs make_prim_refs(const Mesh& mesh, Threads& threads);
 
 }  // namespace wive

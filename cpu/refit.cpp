@@ -22,7 +22,7 @@ public:
         : from_(from), to_(to), mesh_(mesh), accuracy_(accuracy), boxes_(node_width * node_count) {}
 
     // Also writes the leaves.
-    void fit(unsigned threads) {
+    void fit(Threads& threads) {
         std::vector<std::uint32_t> nodes = {inner_child(0)};  // breadth first; those before `top` wait for the others
         std::size_t top = 0;
         for (; top < nodes.size() && nodes.size() - top < task_count; ++top)
@@ -96,7 +96,7 @@ private:
 };
 
 // Whether a triangle that is in no leaf has an area.
-bool is_one_missing(std::span<const TriangleBlock> blocks, const Mesh& mesh, unsigned threads) {
+bool is_one_missing(std::span<const TriangleBlock> blocks, const Mesh& mesh, Threads& threads) {
     std::vector<char> present(mesh.face_count);
     for (const TriangleBlock& block : blocks)
         for (const std::int32_t prim : block.prim)
@@ -112,8 +112,8 @@ bool is_one_missing(std::span<const TriangleBlock> blocks, const Mesh& mesh, uns
 
 }  // namespace
 
-std::unique_ptr<Bvh> Bvh::refitted(const Mesh& mesh, unsigned threads) const {
-    threads = thread_count(threads);
+std::unique_ptr<Bvh> Bvh::refitted(const Mesh& mesh, unsigned asked_threads) const {
+    Threads threads(thread_count(asked_threads));
     check_mesh(mesh, threads);
     if (triangle_count_ < mesh.face_count && is_one_missing(blocks(), mesh, threads)) return nullptr;
     std::unique_ptr<Bvh> bvh(new Bvh);

@@ -52,7 +52,7 @@ public:
         nodes_[root_].parent = none;
     }
 
-    void optimize(unsigned threads) {
+    void optimize(Threads& threads) {
         for (int i = 0; i < rounds && improve(threads); ++i) {
         }
     }
@@ -119,7 +119,7 @@ private:
     }
 
     // One round. False where nothing moved.
-    bool improve(unsigned threads) {
+    bool improve(Threads& threads) {
         std::vector<Move> moves(used_);
         parallel_chunks(used_, chunk_size, threads, [&](std::size_t begin, std::size_t end) {
             std::vector<std::pair<float, std::uint32_t>> stack;
@@ -266,7 +266,7 @@ private:
 
 }  // namespace
 
-bool optimize_by_reinsertion(BinaryTree& tree, unsigned threads) {
+bool optimize_by_reinsertion(BinaryTree& tree, Threads& threads) {
     if (tree.count <= block_width) return true;
     LinkedTree linked(tree);
     linked.optimize(threads);

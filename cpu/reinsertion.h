@@ -2,6 +2,7 @@
 #pragma once
 
 #include "binary_tree.h"
+#include "parallel.h"
 
 namespace wive {
 
@@ -9,6 +10,6 @@ namespace wive {
 // threads; Meister, Bittner 2018, "Parallel Reinsertion for Bounding Volume Hierarchy Optimization"), then those that
 // found one move, largest gain first, each only if it still gains. Deterministic on any number of threads. False, and
 // the tree is as it was, where the better one would be too deep to be walked by recursion.
-bool optimize_by_reinsertion(BinaryTree& tree, unsigned threads);
+bool optimize_by_reinsertion(BinaryTree& tree, Threads& threads);
 
 }  // namespace wive
