@@ -54,7 +54,7 @@ class Scene(Refittable):
                 device, else "cpu". A device alone implies backend "warp"; CPU backends take none.
             accuracy: "watertight" (rays never slip between triangles that share an edge or vertex) or "fast".
             nodes: "float32".
-            quality: "medium", or "high" for a tree that takes two to four times as long to build and gives
+            quality: "medium", or "high" for a tree that takes about four times as long to build and gives
                 the same hits in fewer steps: a sixth fewer where sizes differ much, none in even meshes.
 
         C-contiguous float32 vertices and int32 faces are kept, not copied: don't change them afterwards.
