@@ -70,7 +70,8 @@ public:
             Item& item = items_[i];
             if (item.left == 0) continue;
             const Item &left = items_[item.left], &right = items_[item.left + 1];
-            item.costs = store_node(item.range, left.costs, right.costs, right.range.tree.begin, item.axis);
+            item.costs = store_node(tree_, item.range.tree, item.range.box, right.range.tree.begin, item.axis, left.costs,
+                                    right.costs);
         }
     }
 
@@ -111,15 +112,6 @@ private:
         return range.depth + static_cast<int>(std::bit_width(blocks_for(range.tree.size()))) < depth_limit_;
     }
 
-    SlotCosts store_node(const Range& range, const SlotCosts& left, const SlotCosts& right, std::uint32_t split, int axis) {
-        const Box& box = range.box;
-        SlotCosts costs;
-        const Choices choices = gather(blocks_for(range.tree.size()), box.half_area(), left, right, axis, costs);
-        tree_.nodes[range.tree.place] = std::bit_cast<PrimRef>(
-            BinaryNode{{box.lo[0], box.lo[1], box.lo[2]}, split, {box.hi[0], box.hi[1], box.hi[2]}, choices});
-        return costs;
-    }
-
     // Builds the subtree over a range on this thread.
     SlotCosts build_range(const Range& range, bool from_scratch = false) {
         if (!range.tree.has_node()) {
@@ -129,7 +121,7 @@ private:
         const Halves halves = split_alone(range, from_scratch);
         const SlotCosts left = build_range(halves.left);
         const SlotCosts right = build_range(halves.right);
-        return store_node(range, left, right, halves.right.tree.begin, halves.axis);
+        return store_node(tree_, range.tree, range.box, halves.right.tree.begin, halves.axis, left, right);
     }
 
     static int longest_axis(const Range& range) {

@@ -1,5 +1,6 @@
 #include "collapse.h"
 
+#include <bit>
 #include <limits>
 
 namespace wive {
@@ -79,8 +80,7 @@ void share_slots(const SlotCosts& left, SlotCosts right, Slots<Float4v>& least, 
     }
 }
 
-}  // namespace
-
+// The best way to gather a subtree of so many blocks, half its box's area; `costs` is set to what it costs.
 Choices gather(std::uint32_t blocks, float half_area, const SlotCosts& left, const SlotCosts& right, int axis,
                SlotCosts& costs) {
     Slots<Float4v> shared;
@@ -102,6 +102,17 @@ Choices gather(std::uint32_t blocks, float half_area, const SlotCosts& left, con
     const Int4v used = (shares.first & (shared.first < fewer_first)) | (shares.second & (shared.second < fewer_second));
     const std::uint32_t bits = static_cast<std::uint32_t>(used[0] | used[1] | used[2] | used[3]);
     return {bits | (as_leaf ? 1u : 0u), wide_share, axis};
+}
+
+}  // namespace
+
+SlotCosts store_node(BinaryTree& tree, const Subtree& top, const Box& box, std::uint32_t split, int axis,
+                     const SlotCosts& left, const SlotCosts& right) {
+    SlotCosts costs;
+    const Choices choices = gather(blocks_for(top.size()), box.half_area(), left, right, axis, costs);
+    tree.nodes[top.place] = std::bit_cast<PrimRef>(
+        BinaryNode{{box.lo[0], box.lo[1], box.lo[2]}, split, {box.hi[0], box.hi[1], box.hi[2]}, choices});
+    return costs;
 }
 
 Treelet gather_treelet(const BinaryTree& tree, const Subtree& top) {

@@ -25,10 +25,9 @@ inline SlotCosts block_costs(const Box& box) {
     return {cost, cost, true};
 }
 
-// The best way to gather a subtree of so many blocks, half its box's area, from what its sides cost; `costs` is set to
-// its own.
-Choices gather(std::uint32_t blocks, float half_area, const SlotCosts& left, const SlotCosts& right, int axis,
-               SlotCosts& costs);
+// Stores the node of a subtree, split there, whose sides cost so much; returns its own costs.
+SlotCosts store_node(BinaryTree& tree, const Subtree& top, const Box& box, std::uint32_t split, int axis,
+                     const SlotCosts& left, const SlotCosts& right);
 
 // A wide node's child: as a leaf or as a wide node.
 struct Slot {

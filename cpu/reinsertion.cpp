@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -243,11 +242,7 @@ private:
         if (apart[axis] < 0) std::swap(left, right);
         const std::uint32_t split = top.begin + linked_[left].count;
         const SlotCosts left_costs = unlink(left, top.left(split)), right_costs = unlink(right, top.right(split));
-        SlotCosts costs;
-        const Choices choices = gather(blocks_for(top.size()), node.box.half_area(), left_costs, right_costs, axis, costs);
-        tree_.nodes[top.place] = std::bit_cast<PrimRef>(BinaryNode{
-            {node.box.lo[0], node.box.lo[1], node.box.lo[2]}, split, {node.box.hi[0], node.box.hi[1], node.box.hi[2]}, choices});
-        return costs;
+        return store_node(tree_, top, node.box, split, axis, left_costs, right_costs);
     }
 
     void write_block(std::uint32_t index, std::uint32_t& place) {
