@@ -1,8 +1,9 @@
 #include "binary_tree.h"
 
 #include <algorithm>
+#include <array>
 #include <bit>
-#include <numeric>
+#include <utility>
 #include <vector>
 
 #include "binned_split.h"
@@ -14,120 +15,113 @@ namespace {
 
 constexpr std::size_t chunk_size = 1 << 13;        // references per step of a parallel split
 constexpr std::uint32_t parallel_range = 1 << 15;  // larger ranges are split by all threads together
+// Smaller ones are split further until there are about so many tasks, or they are too small to be worth handing out.
+constexpr std::uint32_t task_count = 64, smallest_task = 1 << 12;
 
 struct Halves {
     Range left, right;
-    int axis;
+    int axis = 0;
+
+    Halves(const Range& range, std::uint32_t middle, int split_axis)
+        : left{range.tree.left(middle), range.depth + 1, {}, {}},
+          right{range.tree.right(middle), range.depth + 1, {}, {}},
+          axis(split_axis) {}
 };
 
+// A range near the root, whose halves are items themselves, or one that a single thread builds the subtree of.
+struct Item {
+    Range range;
+    bool in_scratch;       // where its references are
+    std::size_t left = 0;  // its halves are items[left] and items[left + 1]; 0: none
+    int axis = 0;
+    SlotCosts costs{};
+};
+
+// References lie in two arrays of equal size, tree.refs and tree.nodes. Ranges near the root move from one to the
+// other with every split; afterwards references stay in tree.refs, and the other array takes what a split moves to
+// the right, and finally the nodes.
 class TreeBuilder {
 public:
-    TreeBuilder(BinaryTree& tree, unsigned threads, int depth_limit, std::uint32_t largest_leaf)
-        : tree_(tree),
-          scratch_(tree.count > parallel_range ? tree.count : 0),
-          threads_(threads),
-          depth_limit_(depth_limit),
-          largest_leaf_(largest_leaf) {}
+    TreeBuilder(BinaryTree& tree, Threads& threads, int depth_limit)
+        : tree_(tree), threads_(threads), depth_limit_(depth_limit) {}
 
-    void build() {
-        struct Item {
-            Range range;
-            bool in_scratch = false;
-            std::size_t left = 0;  // its two halves stand at items[left] and items[left + 1]; 0: none
-            std::uint32_t split = 0;
-            SlotCosts costs{};
-        };
-        std::vector<Item> items;
-        items.push_back({whole_range()});
-        for (std::size_t i = 0; i < items.size(); ++i) {
-            if (items[i].range.size() <= parallel_range) continue;
-            const bool from_scratch = items[i].in_scratch;
-            const Halves halves = split_together(items[i].range, from_scratch);
-            items[i].left = items.size();
-            items[i].split = store_node(items[i].range, halves);
-            items.push_back({halves.left, !from_scratch});
-            items.push_back({halves.right, !from_scratch});
+    void build(const Box& centroids) {
+        items_.push_back({{tree_.root(), 0, tree_.box, centroids}, false});
+        for (std::size_t i = 0; i < items_.size(); ++i) {
+            if (items_[i].range.tree.size() <= parallel_range) continue;
+            const bool from_scratch = items_[i].in_scratch;
+            const Halves halves = split_together(items_[i].range, from_scratch);
+            items_[i].left = items_.size();
+            items_[i].axis = halves.axis;
+            items_.push_back({halves.left, !from_scratch});
+            items_.push_back({halves.right, !from_scratch});
         }
-        std::vector<std::size_t> tasks;
-        for (std::size_t i = 0; i < items.size(); ++i)
-            if (items[i].left == 0) tasks.push_back(i);
+        while (split_items()) {
+        }
+        std::vector<std::size_t> tasks = leaf_items(0);
         std::sort(tasks.begin(), tasks.end(), [&](std::size_t a, std::size_t b) {
-            return items[a].range.size() > items[b].range.size();
+            return items_[a].range.tree.size() > items_[b].range.tree.size();
         });
         parallel_for(tasks.size(), threads_, [&](std::size_t i) {
-            Item& item = items[tasks[i]];
-            const Range& r = item.range;
-            if (item.in_scratch)
-                std::copy(scratch_.data() + r.begin, scratch_.data() + r.end, tree_.refs.data() + r.begin);
-            item.costs = build_range(r, item.split);
+            Item& item = items_[tasks[i]];
+            item.costs = build_range(item.range, item.in_scratch);
         });
-        for (std::size_t i = items.size(); i-- > 0;) {
-            Item& item = items[i];
+        for (std::size_t i = items_.size(); i-- > 0;) {
+            Item& item = items_[i];
             if (item.left == 0) continue;
-            BinaryNode& node = tree_.nodes[item.split];
-            node.left = items[item.left].split;
-            node.right = items[item.left + 1].split;
-            item.costs = gather_costs(node, item.range.box, items[item.left].costs, items[item.left + 1].costs,
-                                      largest_leaf_);
+            const Item &left = items_[item.left], &right = items_[item.left + 1];
+            item.costs = store_node(tree_, item.range.tree, item.range.box, right.range.tree.begin, item.axis, left.costs,
+                                    right.costs);
         }
-        tree_.root = items[0].split;
-        tree_.box = items[0].range.box;
     }
 
 private:
+    // Items without halves of more than so many references.
+    std::vector<std::size_t> leaf_items(std::uint32_t more_than) const {
+        std::vector<std::size_t> leaves;
+        for (std::size_t i = 0; i < items_.size(); ++i)
+            if (items_[i].left == 0 && items_[i].range.tree.size() > more_than) leaves.push_back(i);
+        return leaves;
+    }
+
+    // Splits the items that are too large for a task, each on one thread. False if there are none.
+    bool split_items() {
+        const std::vector<std::size_t> large = leaf_items(std::max(smallest_task, tree_.count / task_count));
+        const std::size_t first = items_.size();
+        items_.resize(first + 2 * large.size());
+        parallel_for(large.size(), threads_, [&](std::size_t i) {
+            Item& item = items_[large[i]];
+            const Halves halves = split_alone(item.range, item.in_scratch);
+            item.left = first + 2 * i;
+            item.axis = halves.axis;
+            items_[item.left] = {halves.left, false};
+            items_[item.left + 1] = {halves.right, false};
+        });
+        return !large.empty();
+    }
+
+    // Brings a range's references to tree.refs.
+    PrimRef* fetch(const Range& range, bool from_scratch) const {
+        const Subtree& r = range.tree;
+        if (from_scratch) std::copy(tree_.nodes.data() + r.begin, tree_.nodes.data() + r.end, tree_.refs.data() + r.begin);
+        return tree_.refs.data();
+    }
+
     // Whether SAH may still choose: halving must be able to finish within the depth that is left.
     bool may_choose(const Range& range) const {
-        return range.depth + static_cast<int>(std::bit_width(blocks_for(range.size()))) < depth_limit_;
+        return range.depth + static_cast<int>(std::bit_width(blocks_for(range.tree.size()))) < depth_limit_;
     }
 
-    Range whole_range() {
-        std::vector<Range> parts((tree_.count + chunk_size - 1) / chunk_size);
-        parallel_chunks(tree_.count, chunk_size, threads_, [&](std::size_t begin, std::size_t end) {
-            Range part{};
-            for (std::size_t i = begin; i < end; ++i) {
-                part.box.grow(tree_.refs[i].box());
-                part.centroids.grow(tree_.refs[i].centroid());
-            }
-            parts[begin / chunk_size] = part;
-        });
-        Range all{0, tree_.count, 0, {}, {}};
-        for (const Range& part : parts) {
-            all.box.grow(part.box);
-            all.centroids.grow(part.centroids);
+    // Builds the subtree over a range on this thread.
+    SlotCosts build_range(const Range& range, bool from_scratch = false) {
+        if (!range.tree.has_node()) {
+            fetch(range, from_scratch);
+            return block_costs(range.box);
         }
-        return all;
-    }
-
-    std::uint32_t store_node(const Range& range, const Halves& halves) {
-        const std::uint32_t split = halves.right.begin;
-        BinaryNode& node = tree_.nodes[split];
-        for (int k = 0; k < 3; ++k) {
-            node.lo[k] = range.box.lo[k];
-            node.hi[k] = range.box.hi[k];
-        }
-        node.begin = range.begin;
-        node.end = range.end;
-        node.left = node.right = 0;
-        node.axis = static_cast<std::uint8_t>(halves.axis);
-        return split;
-    }
-
-    // Builds the subtree over a range on this thread. `split` is set to its root's place, if it has a node.
-    SlotCosts build_range(const Range& range, std::uint32_t& split) {
-        if (range.size() <= block_width) return block_costs(range.box);
-        const Halves halves = split_alone(range);
-        split = store_node(range, halves);
-        std::uint32_t left_split = 0, right_split = 0;
-        const SlotCosts left = build_range(halves.left, left_split);
-        const SlotCosts right = build_range(halves.right, right_split);
-        BinaryNode& node = tree_.nodes[split];
-        node.left = left_split;
-        node.right = right_split;
-        return gather_costs(node, range.box, left, right, largest_leaf_);
-    }
-
-    static Halves start_halves(const Range& range, std::uint32_t middle, int axis) {
-        return {{range.begin, middle, range.depth + 1, {}, {}}, {middle, range.end, range.depth + 1, {}, {}}, axis};
+        const Halves halves = split_alone(range, from_scratch);
+        const SlotCosts left = build_range(halves.left);
+        const SlotCosts right = build_range(halves.right);
+        return store_node(tree_, range.tree, range.box, halves.right.tree.begin, halves.axis, left, right);
     }
 
     static int longest_axis(const Range& range) {
@@ -139,116 +133,126 @@ private:
     }
 
     // Halves by number, along the longest axis where centroids differ: always possible, always balanced.
-    Halves split_by_number(const Range& range, PrimRef* refs) const {
+    static Halves split_by_number(const Range& range, PrimRef* refs) {
+        const auto [begin, end, place] = range.tree;
         const int axis = longest_axis(range);
-        const std::uint32_t middle = range.begin + (blocks_for(range.size()) + 1) / 2 * block_width;
-        Halves halves = start_halves(range, std::min(middle, range.end - 1), axis);
-        std::nth_element(refs + range.begin, refs + halves.right.begin, refs + range.end,
+        const std::uint32_t middle = begin + (blocks_for(end - begin) + 1) / 2 * block_width;
+        Halves halves(range, std::min(middle, end - 1), axis);
+        std::nth_element(refs + begin, refs + halves.right.tree.begin, refs + end,
                          [axis](const PrimRef& a, const PrimRef& b) {
                              const float x = a.centroid()[axis], y = b.centroid()[axis];
                              return x < y || (x == y && a.prim() < b.prim());
                          });
         for (Range* half : {&halves.left, &halves.right})
-            for (std::uint32_t i = half->begin; i < half->end; ++i) {
-                half->box.grow(refs[i].box());
-                half->centroids.grow(refs[i].centroid());
-            }
+            for (std::uint32_t i = half->tree.begin; i < half->tree.end; ++i) half->grow(refs[i]);
         return halves;
     }
 
-    Halves split_alone(const Range& range) const {
-        PrimRef* refs = tree_.refs.data();
-        if (!may_choose(range)) return split_by_number(range, refs);
+    // Copies references to where `to` points for their side, without a branch, which no processor could predict. Both
+    // places are written to each time; neither may lie ahead of what is read, except where it is another array.
+    static void partition(const PrimRef* begin, const PrimRef* end, const BinMap& bin_of, Split split, PrimRef*& left,
+                          PrimRef*& right) {
+        for (const PrimRef* ref = begin; ref < end; ++ref) {
+            const bool goes_left = bin_of.goes_left(*ref, split);
+            const PrimRef copy = *ref;
+            *left = copy;
+            *right = copy;
+            left += goes_left;
+            right += !goes_left;
+        }
+    }
+
+    // Leaves both sides in tree.refs.
+    Halves split_alone(const Range& range, bool from_scratch) const {
+        if (!may_choose(range)) return split_by_number(range, fetch(range, from_scratch));
+        const auto [begin, end, place] = range.tree;
+        PrimRef *refs = tree_.refs.data(), *scratch = tree_.nodes.data();
+        const PrimRef* from = from_scratch ? scratch : refs;
         const BinMap bin_of(range);
         Bins bins(bin_of.count);
-        bins.add(refs, range.begin, range.end, bin_of);
+        bins.add(from + begin, from + end, bin_of);
         const Split split = best_split(bins, bin_of);
-        if (split.axis < 0) return split_by_number(range, refs);
-        const auto goes_left = [&](Float4v centroid) { return bin_of(centroid, split.axis) < split.bin; };
-        Box left, right;  // of the centroids
-        std::uint32_t i = range.begin, j = range.end;
-        for (;;) {
-            for (; i < j && goes_left(refs[i].centroid()); ++i) left.grow(refs[i].centroid());
-            for (; i < j && !goes_left(refs[j - 1].centroid()); --j) right.grow(refs[j - 1].centroid());
-            if (i == j) break;
-            left.grow(refs[j - 1].centroid());
-            right.grow(refs[i].centroid());
-            std::swap(refs[i++], refs[--j]);
+        if (split.axis < 0) return split_by_number(range, fetch(range, from_scratch));
+        PrimRef *left = refs + begin, *right = scratch + begin;
+        partition(from + begin, from + end, bin_of, split, left, right);
+        Halves halves(range, static_cast<std::uint32_t>(left - refs), split.axis);
+        for (const PrimRef* ref = refs + begin; ref < left; ++ref) halves.left.grow(*ref);
+        for (const PrimRef* ref = scratch + begin; ref < right; ++ref) {
+            halves.right.grow(*ref);
+            *left++ = *ref;
         }
-        Halves halves = start_halves(range, i, split.axis);
-        halves.left.box = bins.box_of(split.axis, 0, split.bin), halves.left.centroids = left;
-        halves.right.box = bins.box_of(split.axis, split.bin, bin_of.count), halves.right.centroids = right;
         return halves;
     }
 
     // The same over all threads: chunks are binned apart, then copied to the other array, each to places known
     // from the bins. The result depends on the chunks, whose size is fixed, and not on the threads.
     Halves split_together(const Range& range, bool from_scratch) {
-        PrimRef* from = from_scratch ? scratch_.data() : tree_.refs.data();
-        PrimRef* to = from_scratch ? tree_.refs.data() : scratch_.data();
+        PrimRef* from = (from_scratch ? tree_.nodes : tree_.refs).data();
+        PrimRef* to = (from_scratch ? tree_.refs : tree_.nodes).data();
+        const std::uint32_t first = range.tree.begin, size = range.tree.size();
         const BinMap bin_of(range);
-        const std::size_t chunks = (range.size() + chunk_size - 1) / chunk_size;
+        const std::size_t chunks = (size + chunk_size - 1) / chunk_size;
         std::vector<Bins> parts(chunks, Bins(bin_of.count));
-        parallel_chunks(range.size(), chunk_size, threads_, [&](std::size_t begin, std::size_t end) {
-            parts[begin / chunk_size].add(from, range.begin + begin, range.begin + end, bin_of);
+        parallel_chunks(size, chunk_size, threads_, [&](std::size_t begin, std::size_t end) {
+            parts[begin / chunk_size].add(from + first + begin, from + first + end, bin_of);
         });
         Bins bins(bin_of.count);
         for (const Bins& part : parts) bins.add(part, bin_of.count);
         const Split split = may_choose(range) ? best_split(bins, bin_of) : Split{};
         if (split.axis < 0) {
             const Halves halves = split_by_number(range, from);
-            std::copy(from + range.begin, from + range.end, to + range.begin);
+            std::copy(from + first, from + range.tree.end, to + first);
             return halves;
         }
-        const auto lefts = [&](const Bins& part) {
-            return std::accumulate(part.count[split.axis], part.count[split.axis] + split.bin, std::uint32_t{0});
-        };
-        Halves halves = start_halves(range, range.begin + lefts(bins), split.axis);
-        std::vector<std::uint32_t> left_begin(chunks), right_begin(chunks);
-        std::uint32_t left = halves.left.begin, right = halves.right.begin;
+        Halves halves(range, first + bins.count_left(split), split.axis);
+        std::vector<std::array<PrimRef*, 2>> places(chunks + 1);  // where each chunk's left and right references go
+        places[0] = {to + first, to + halves.right.tree.begin};
         for (std::size_t i = 0; i < chunks; ++i) {
-            left_begin[i] = left;
-            right_begin[i] = right;
-            const std::uint32_t size = static_cast<std::uint32_t>(std::min(chunk_size, range.size() - i * chunk_size));
-            left += lefts(parts[i]);
-            right += size - lefts(parts[i]);
+            const std::size_t left = parts[i].count_left(split);
+            places[i + 1] = {places[i][0] + left, places[i][1] + std::min(chunk_size, size - i * chunk_size) - left};
         }
-        std::vector<std::array<Box, 2>> centroids(chunks);
-        parallel_chunks(range.size(), chunk_size, threads_, [&](std::size_t begin, std::size_t end) {
+        std::vector<std::array<Range, 2>> sides(chunks);
+        parallel_chunks(size, chunk_size, threads_, [&](std::size_t begin, std::size_t end) {
             const std::size_t chunk = begin / chunk_size;
-            std::uint32_t next[2] = {left_begin[chunk], right_begin[chunk]};
-            for (std::size_t i = range.begin + begin; i < range.begin + end; ++i) {
-                const Float4v centroid = from[i].centroid();
-                const bool side = bin_of(centroid, split.axis) >= split.bin;
-                centroids[chunk][side].grow(centroid);
-                to[next[side]++] = from[i];
-            }
+            partition_chunk(from + first + begin, from + first + end, bin_of, split, places[chunk]);
+            for (std::size_t side = 0; side < 2; ++side)
+                for (const PrimRef* ref = places[chunk][side]; ref < places[chunk + 1][side]; ++ref)
+                    sides[chunk][side].grow(*ref);
         });
-        for (const auto& part : centroids) {
-            halves.left.centroids.grow(part[0]);
-            halves.right.centroids.grow(part[1]);
+        for (const auto& [left, right] : sides) {
+            halves.left.grow(left);
+            halves.right.grow(right);
         }
-        halves.left.box = bins.box_of(split.axis, 0, split.bin);
-        halves.right.box = bins.box_of(split.axis, split.bin, bin_of.count);
         return halves;
     }
 
+    static void partition_chunk(const PrimRef* begin, const PrimRef* end, const BinMap& bin_of, Split split,
+                                std::array<PrimRef*, 2> to) {
+        auto [left, right] = to;
+        for (const PrimRef* ref = begin; ref < end; ++ref) {
+            const bool goes_left = bin_of.goes_left(*ref, split);
+            *(goes_left ? left : right) = *ref;
+            left += goes_left;
+            right += !goes_left;
+        }
+    }
+
     BinaryTree& tree_;
-    LargeArray<PrimRef> scratch_;
-    unsigned threads_;
+    std::vector<Item> items_;
+    Threads& threads_;
     int depth_limit_;
-    std::uint32_t largest_leaf_;
 };
 
 }  // namespace
 
-BinaryTree build_binary_tree(LargeArray<PrimRef> refs, std::uint32_t count, unsigned threads, int depth_limit,
-                             std::uint32_t largest_leaf) {
+BinaryTree build_binary_tree(PrimRefs refs, Threads& threads, int depth_limit, std::uint32_t largest_leaf) {
     BinaryTree tree;
-    tree.refs = std::move(refs);
-    tree.count = count;
-    tree.nodes = LargeArray<BinaryNode>(count);
-    if (count > 0) TreeBuilder(tree, threads, depth_limit, largest_leaf).build();
+    tree.largest_leaf = largest_leaf;
+    tree.refs = std::move(refs.refs);
+    tree.nodes = LargeArray<PrimRef>(refs.count);
+    tree.count = refs.count;
+    tree.box = refs.box;
+    if (tree.count > block_width) TreeBuilder(tree, threads, depth_limit).build(refs.centroids);
     return tree;
 }
 

@@ -65,22 +65,41 @@ ChildOrder parse_order(const std::string& name) {
     return ChildOrder::none;
 }
 
+Quality parse_quality(const std::string& name) {
+    if (name == "high") return Quality::high;
+    expect(name == "medium", "quality: expected 'medium' or 'high'");
+    return Quality::medium;
+}
+
 // The tree together with the arrays it was built from, which rendering reads.
 class PyBvh {
 public:
     PyBvh(Array<float> vertices, Array<std::int32_t> faces, const std::string& accuracy, const std::string& order,
-          unsigned threads, int depth_limit, const std::string& nodes)
+          unsigned threads, int depth_limit, const std::string& nodes, const std::string& quality)
         : vertices_(std::move(vertices)), faces_(std::move(faces)) {
         expect_shape(vertices_, 3, "vertices: expected shape (v, 3)");
         expect_shape(faces_, 3, "faces: expected shape (f, 3)");
         expect(depth_limit >= 1 && depth_limit <= max_depth, "depth_limit: expected 1 to 64");
-        const BuildOptions options = {parse_accuracy(accuracy), parse_nodes(nodes), parse_order(order), threads, depth_limit};
+        options_ = {parse_accuracy(accuracy), parse_nodes(nodes), parse_order(order),
+                    threads,                  depth_limit,        parse_quality(quality)};
         const Mesh view = mesh();
         py::gil_scoped_release release;
-        bvh_ = std::make_unique<Bvh>(view, options);
+        bvh_ = std::make_unique<Bvh>(view, options_);
+    }
+
+    // The same faces over moved vertices. Where the tree can't be kept it is built anew.
+    PyBvh(const PyBvh& other, Array<float> vertices, unsigned threads)
+        : vertices_(std::move(vertices)), faces_(other.faces_), options_(other.options_) {
+        expect_shape(vertices_, 3, "vertices: expected shape (v, 3)");
+        options_.threads = threads;
+        const Mesh view = mesh();
+        py::gil_scoped_release release;
+        bvh_ = other.bvh_->refitted(view, threads);
+        if (!bvh_) bvh_ = std::make_unique<Bvh>(view, options_);
     }
 
     const Bvh& bvh() const { return *bvh_; }
+    const Array<float>& vertices() const { return vertices_; }
     Mesh mesh() const {
         return {vertices_.data(), static_cast<std::size_t>(vertices_.shape(0)), faces_.data(),
                 static_cast<std::size_t>(faces_.shape(0))};
@@ -89,6 +108,7 @@ public:
 private:
     Array<float> vertices_;
     Array<std::int32_t> faces_;
+    BuildOptions options_;
     std::unique_ptr<Bvh> bvh_;
 };
 
@@ -227,7 +247,8 @@ std::uint64_t render(const PyBvh& self, const std::string& kernel, const Array<f
                            in_flight,
                            foreign_tracer(tracer)};
     py::gil_scoped_release release;
-    check_mesh(job.mesh, thread_count(threads));  // its arrays are the caller's, who may have changed them since
+    Threads checkers(thread_count(threads));
+    check_mesh(job.mesh, checkers);  // its arrays are the caller's, who may have changed them since
     return render_rows(job, row_begin, row_end, thread_count(threads));
 }
 
@@ -267,9 +288,14 @@ PYBIND11_MODULE(_cpu, m, py::mod_gil_not_used()) {
     const auto array = [](const char* name) { return py::arg(name).noconvert(); };
     py::class_<PyBvh>(m, "Bvh")
         .def(py::init<Array<float>, Array<std::int32_t>, const std::string&, const std::string&, unsigned, int,
-                      const std::string&>(),
+                      const std::string&, const std::string&>(),
              array("vertices"), array("faces"), py::arg("accuracy") = "watertight", py::arg("order") = "treelet",
-             py::arg("threads") = 0, py::arg("depth_limit") = max_depth, py::arg("nodes") = "float32")
+             py::arg("threads") = 0, py::arg("depth_limit") = max_depth, py::arg("nodes") = "float32",
+             py::arg("quality") = "medium")
+        .def("refitted", [](const PyBvh& self, const Array<float>& vertices, unsigned threads) {
+            return std::make_unique<PyBvh>(self, vertices, threads);
+        }, array("vertices"), py::arg("threads") = 0)
+        .def_property_readonly("vertices", &PyBvh::vertices)
         .def_property_readonly("nodes", [](py::object self) {
             const Bvh& bvh = self.cast<const PyBvh&>().bvh();
             return rows(self, bvh.nodes(), bvh.node_bytes(), 8);

@@ -2,9 +2,9 @@
 // Bounding Volume Hierarchies"), all three axes in one pass.
 #pragma once
 
-#include <algorithm>
 #include <cstdint>
 
+#include "binary_tree.h"
 #include "box.h"
 #include "mesh.h"
 
@@ -12,13 +12,24 @@ namespace wive {
 
 inline constexpr int max_bins = 32;
 
-typedef std::int32_t Int4v __attribute__((vector_size(16)));
-
 struct Range {
-    std::uint32_t begin, end;
+    Subtree tree;
     int depth;
     Box box, centroids;
-    std::uint32_t size() const { return end - begin; }
+
+    void grow(const PrimRef& ref) {
+        box.grow(ref.box());
+        centroids.grow(ref.centroid());
+    }
+    void grow(const Range& other) {
+        box.grow(other.box);
+        centroids.grow(other.centroids);
+    }
+};
+
+struct Split {
+    int axis = -1;  // -1: no plane separates the centroids, halve the range
+    int bin = 0;    // bins below go left
 };
 
 // Maps a centroid to its bin on each axis. Small ranges get few bins, as in Embree.
@@ -26,62 +37,55 @@ struct BinMap {
     Float4v base, scale;
     int count;
 
-    explicit BinMap(const Range& range)
-        : base(range.centroids.lo),
-          scale{},
-          count(static_cast<int>(std::min<float>(max_bins, 4.0f + 0.05f * static_cast<float>(range.size())))) {
+    explicit BinMap(const Range& range) : base(range.centroids.lo), count(bins_for(range.tree.size())) {
         const Float4v extent = range.centroids.hi - range.centroids.lo;
-        for (int axis = 0; axis < 3; ++axis)
-            if (extent[axis] > 1e-34f) scale[axis] = 0.9999f * static_cast<float>(count) / extent[axis];
+        const Float4v none = {};
+        scale = extent > 1e-34f ? 0.9999f * static_cast<float>(count) / extent : none;
     }
-    Int4v operator()(Float4v centroid) const {
-        return __builtin_convertvector((centroid - base) * scale, Int4v);
+    static int bins_for(std::uint32_t size) {
+        return size < 560 ? static_cast<int>(4.0f + 0.05f * static_cast<float>(size)) : max_bins;
     }
-    // The same on one axis alone.
-    int operator()(Float4v centroid, int axis) const {
-        return static_cast<int>((centroid[axis] - base[axis]) * scale[axis]);
+    Int4v operator()(Float4v centroid) const { return __builtin_convertvector((centroid - base) * scale, Int4v); }
+
+    // Whether a reference falls into a bin below the split's: one axis of the same arithmetic, read from memory.
+    bool goes_left(const PrimRef& ref, Split split) const {
+        const float centroid = ref.lo[split.axis] + ref.hi[split.axis];
+        return (centroid - base[split.axis]) * scale[split.axis] < static_cast<float>(split.bin);
     }
 };
 
 struct Bins {
-    Box box[3][max_bins];
-    std::uint32_t count[3][max_bins];
+    Box box[max_bins][3];
+    alignas(16) std::int32_t count[max_bins][4];
 
     explicit Bins(int bins) {
-        for (int axis = 0; axis < 3; ++axis)
-            for (int i = 0; i < bins; ++i) {
-                box[axis][i] = Box{};
-                count[axis][i] = 0;
-            }
+        for (int i = 0; i < bins; ++i) {
+            for (int axis = 0; axis < 3; ++axis) box[i][axis] = Box{};
+            for (std::int32_t& n : count[i]) n = 0;
+        }
     }
-    void add(const PrimRef* refs, std::size_t begin, std::size_t end, const BinMap& bin_of) {
-        for (std::size_t i = begin; i < end; ++i) {
-            const Int4v bin = bin_of(refs[i].centroid());
-            const Box prim = refs[i].box();
+    void add(const PrimRef* begin, const PrimRef* end, const BinMap& bin_of) {
+        for (const PrimRef* ref = begin; ref < end; ++ref) {
+            const Int4v bin = bin_of(ref->centroid());
             for (int axis = 0; axis < 3; ++axis) {
-                box[axis][bin[axis]].grow(prim);
-                ++count[axis][bin[axis]];
+                box[bin[axis]][axis].grow(ref->box());
+                ++count[bin[axis]][axis];
             }
         }
     }
-    // The box of all that falls into bins [begin, end) of an axis.
-    Box box_of(int axis, int begin, int end) const {
-        Box all;
-        for (int i = begin; i < end; ++i) all.grow(box[axis][i]);
-        return all;
-    }
     void add(const Bins& other, int bins) {
-        for (int axis = 0; axis < 3; ++axis)
-            for (int i = 0; i < bins; ++i) {
-                box[axis][i].grow(other.box[axis][i]);
-                count[axis][i] += other.count[axis][i];
+        for (int i = 0; i < bins; ++i)
+            for (int axis = 0; axis < 3; ++axis) {
+                box[i][axis].grow(other.box[i][axis]);
+                count[i][axis] += other.count[i][axis];
             }
     }
-};
-
-struct Split {
-    int axis = -1;  // -1: no plane separates the centroids, halve the range
-    int bin = 0;    // bins below go left
+    // How many references fall into bins below the split's.
+    std::uint32_t count_left(Split split) const {
+        std::int32_t n = 0;
+        for (int i = 0; i < split.bin; ++i) n += count[i][split.axis];
+        return static_cast<std::uint32_t>(n);
+    }
 };
 
 Split best_split(const Bins& bins, const BinMap& bin_of);

@@ -1,12 +1,14 @@
 // An axis-aligned box for the builder, two four-wide vectors; the fourth lane is free for the owner's use.
 #pragma once
 
+#include <cstdint>
 #include <limits>
 
 namespace wive {
 
 // GCC's and Clang's portable vectors: SSE on x86, NEON on Arm.
 typedef float Float4v __attribute__((vector_size(16)));
+typedef std::int32_t Int4v __attribute__((vector_size(16)));
 
 inline Float4v minimum(Float4v a, Float4v b) { return a < b ? a : b; }
 inline Float4v maximum(Float4v a, Float4v b) { return a > b ? a : b; }

@@ -4,11 +4,12 @@
 #include <cmath>
 #include <limits>
 #include <stdexcept>
-#include <utility>
 
 #include "binary_tree.h"
 #include "emit.h"
 #include "parallel.h"
+#include "reinsertion.h"
+#include "write_node.h"
 
 namespace wive {
 
@@ -22,22 +23,33 @@ constexpr std::uint32_t largest_leaf(NodeForm form) {
 }  // namespace
 
 Bvh::Bvh(const Mesh& mesh, const BuildOptions& options) : accuracy_(options.accuracy), form_(options.nodes) {
-    const unsigned threads = thread_count(options.threads);
+    Threads threads(thread_count(options.threads));
     if (mesh.face_count >= leaf_bit) throw std::invalid_argument("faces: too many triangles for one scene");
     check_mesh(mesh, threads);
-    std::size_t count = 0;
-    LargeArray<PrimRef> refs = make_prim_refs(mesh, threads, count);
-    const BinaryTree tree = build_binary_tree(std::move(refs), static_cast<std::uint32_t>(count), threads,
-                                              options.depth_limit, largest_leaf(form_));
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-        bounds_[0][axis] = tree.box.lo[axis];
-        bounds_[1][axis] = tree.box.hi[axis];
+    BinaryTree tree = build_binary_tree(make_prim_refs(mesh, threads), threads, options.depth_limit, largest_leaf(form_));
+    if (options.quality == Quality::high) optimize_by_reinsertion(tree, threads);
+    triangle_count_ = tree.count;
+    set_bounds(tree.box);
+    EmittedTree emitted = emit_tree(tree, mesh, options, center_, threads);
+    if (emitted.depth > options.depth_limit) {  // reinsertion knows no limit, binning does
+        tree = build_binary_tree(make_prim_refs(mesh, threads), threads, options.depth_limit, largest_leaf(form_));
+        emitted = emit_tree(tree, mesh, options, center_, threads);
     }
-    if (count > 0) {
+    units_ = std::move(emitted.units);
+    node_count_ = emitted.node_count;
+    depth_ = emitted.depth;
+}
+
+void Bvh::set_bounds(const Box& box) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+        bounds_[0][axis] = box.lo[axis];
+        bounds_[1][axis] = box.hi[axis];
+    }
+    if (box.lo[0] <= box.hi[0]) {
         // Far from the origin, planes relative to the middle keep the boxes' slack small. Near it, the planes
         // are left as they are, and so stay exact.
-        const Float4v middle = tree.box.lo * 0.5f + tree.box.hi * 0.5f;
-        const Float4v half = tree.box.hi * 0.5f - tree.box.lo * 0.5f;
+        const Float4v middle = box.lo * 0.5f + box.hi * 0.5f;
+        const Float4v half = box.hi * 0.5f - box.lo * 0.5f;
         const float size = std::max({half[0], half[1], half[2]});
         for (std::size_t axis = 0; axis < 3; ++axis) {
             center_[axis] = std::abs(middle[axis]) > 4 * size ? middle[axis] : 0.0f;
@@ -45,10 +57,6 @@ Bvh::Bvh(const Mesh& mesh, const BuildOptions& options) : accuracy_(options.accu
                                      -plane_below(bounds_[0][axis], center_[axis]));
         }
     }
-    EmittedTree emitted = emit_tree(tree, mesh, options, center_, threads);
-    units_ = std::move(emitted.units);
-    node_count_ = emitted.node_count;
-    depth_ = emitted.depth;
 }
 
 BvhView Bvh::view() const {

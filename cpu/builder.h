@@ -3,8 +3,10 @@
 
 #include <array>
 #include <cstddef>
+#include <memory>
 #include <span>
 
+#include "box.h"
 #include "compressed.h"
 #include "large_array.h"
 #include "layout.h"
@@ -13,18 +15,26 @@
 
 namespace wive {
 
+// medium: binned SAH. high: the same tree optimised further, for several times the build time.
+enum class Quality { medium, high };
+
 struct BuildOptions {
     Accuracy accuracy = Accuracy::watertight;
     NodeForm nodes = NodeForm::float32;
     ChildOrder order = ChildOrder::treelet;
     unsigned threads = 0;  // 0: every core
     int depth_limit = max_depth;
+    Quality quality = Quality::medium;
 };
 
 class Bvh {
 public:
     // Throws std::invalid_argument on a mesh that check_mesh refuses. The same tree whatever the threads.
     Bvh(const Mesh& mesh, const BuildOptions& options);
+
+    // The same tree over moved vertices; null where a triangle that had no area, and so no leaf, now has one, and for
+    // compressed trees, whose leaves may need other sizes. Throws as building does.
+    std::unique_ptr<Bvh> refitted(const Mesh& mesh, unsigned threads) const;
 
     BvhView view() const;
     std::size_t bytes() const { return units_.size(); }
@@ -44,13 +54,15 @@ public:
     Sah sah() const;
 
 private:
+    Bvh() = default;
+    void set_bounds(const Box& box);
     template <class StoredNode>
     Sah sah_of(double root) const;
 
     LargeArray<std::byte> units_;
-    std::size_t node_count_ = 0;
-    Accuracy accuracy_;
-    NodeForm form_;
+    std::size_t node_count_ = 0, triangle_count_ = 0;
+    Accuracy accuracy_ = Accuracy::watertight;
+    NodeForm form_ = NodeForm::float32;
     int depth_ = 0;
     std::array<float, 3> center_{}, extent_{};
     std::array<std::array<float, 3>, 2> bounds_{};

@@ -6,29 +6,32 @@
 #pragma once
 
 #include <array>
-#include <vector>
+#include <cstddef>
 
 #include "binary_tree.h"
 #include "order.h"
 
 namespace wive {
 
-using SlotCosts = std::array<float, node_width + 1>;
+// Costs with one to eight slots, never rising: lanes of two vectors.
+struct SlotCosts {
+    Float4v first, second;  // 1 to 4, 5 to 8
+    bool one_block;         // all alike
+};
 
 // Costs of a range small enough for one block: one slot is enough, more don't help.
 inline SlotCosts block_costs(const Box& box) {
-    SlotCosts costs;
-    costs.fill(box.half_area() * block_cost);
-    return costs;
+    const Float4v cost = Float4v{} + box.half_area() * block_cost;
+    return {cost, cost, true};
 }
 
-// Fills in node.share and returns the node's costs. largest_leaf: in blocks of four.
-SlotCosts gather_costs(BinaryNode& node, const Box& box, const SlotCosts& left, const SlotCosts& right,
-                       std::uint32_t largest_leaf);
+// Stores the node of a subtree, split there, whose sides cost so much; returns its own costs.
+SlotCosts store_node(BinaryTree& tree, const Subtree& top, const Box& box, std::uint32_t split, int axis,
+                     const SlotCosts& left, const SlotCosts& right);
 
-// A wide node's child: the references [begin, end), as a leaf or, at its binary split position, as a wide node.
+// A wide node's child: as a leaf or as a wide node.
 struct Slot {
-    std::uint32_t begin, end, split;
+    Subtree tree;
     bool leaf;
 };
 
@@ -38,9 +41,51 @@ struct Treelet {
     SlotSequences order;
 };
 
-// The treelet that the dynamic programme chose for the wide node over the whole range of `split`.
-Treelet gather_treelet(const BinaryTree& tree, std::uint32_t split);
+// The treelet that the dynamic programme chose for the wide node over a whole subtree that has a node.
+Treelet gather_treelet(const BinaryTree& tree, const Subtree& top);
 // The same for the root, which is a wide node even over a single block.
 Treelet gather_root(const BinaryTree& tree);
+
+// How many slots the left side gets; 0: the subtree is one slot. `allowed` falls to what is used.
+inline int left_share(const Choices& choices, int& allowed) {
+    while (allowed > 1 && choices.share(allowed) == 0) --allowed;
+    return allowed > 1 ? choices.share(allowed) : 0;
+}
+
+// Wide nodes, and units of memory for leaves.
+struct TreeSize {
+    std::size_t nodes = 0, leaf_units = 0;
+
+    friend TreeSize operator+(const TreeSize& a, const TreeSize& b) {
+        return {a.nodes + b.nodes, a.leaf_units + b.leaf_units};
+    }
+};
+
+// What a subtree that may fill `allowed` slots adds to the tree. leaf_units(subtree): what a leaf takes.
+template <class LeafUnits>
+TreeSize measure(const BinaryTree& tree, const Subtree& top, int allowed, const LeafUnits& leaf_units) {
+    if (!top.has_node()) return {0, leaf_units(top)};
+    const BinaryNode node = tree.node(top);
+    int share = left_share(node.choices, allowed);
+    TreeSize own = {};
+    if (share == 0) {
+        if (node.choices.as_leaf()) return {0, leaf_units(top)};
+        share = node.choices.wide_share();
+        allowed = node_width;
+        own.nodes = 1;
+    }
+    return own + measure(tree, top.left(node.split), share, leaf_units) +
+           measure(tree, top.right(node.split), allowed - share, leaf_units);
+}
+
+// What is below a slot, without the slot's own node.
+template <class LeafUnits>
+TreeSize measure(const BinaryTree& tree, const Slot& slot, const LeafUnits& leaf_units) {
+    if (slot.leaf) return {0, leaf_units(slot.tree)};
+    const BinaryNode node = tree.node(slot.tree);
+    const int share = node.choices.wide_share();
+    return measure(tree, slot.tree.left(node.split), share, leaf_units) +
+           measure(tree, slot.tree.right(node.split), node_width - share, leaf_units);
+}
 
 }  // namespace wive

@@ -1,8 +1,6 @@
 #include "emit.h"
 
 #include <algorithm>
-#include <cmath>
-#include <limits>
 #include <span>
 #include <stdexcept>
 #include <utility>
@@ -12,27 +10,20 @@
 #include "parallel.h"
 #include "write_compressed.h"
 #include "write_float32.h"
+#include "write_node.h"
 
 namespace wive {
 
-float plane_below(float plane, float center) {
-    const float p = plane - center;
-    return static_cast<double>(p) > static_cast<double>(plane) - center ? std::nextafter(p, -std::numeric_limits<float>::infinity()) : p;
-}
-float plane_above(float plane, float center) {
-    const float p = plane - center;
-    return static_cast<double>(p) < static_cast<double>(plane) - center ? std::nextafter(p, std::numeric_limits<float>::infinity()) : p;
-}
-
 namespace {
 
-constexpr std::uint32_t parallel_subtree = 1 << 14;  // subtrees of at most so many triangles are emitted by one thread
+// Subtrees that one thread emits: about so many, of so many triangles at most and at least.
+constexpr std::uint32_t subtree_count = 64, largest_subtree = 1 << 14, smallest_subtree = 1 << 10;
 
 // A leaf's triangles by rising number.
 class LeafPrims {
 public:
-    LeafPrims(const BinaryTree& tree, const Slot& slot) : count_(slot.end - slot.begin) {
-        for (std::uint32_t i = 0; i < count_; ++i) prims_[i] = tree.refs[slot.begin + i].prim();
+    LeafPrims(const BinaryTree& tree, const Subtree& leaf) : count_(leaf.size()) {
+        for (std::uint32_t i = 0; i < count_; ++i) prims_[i] = tree.refs[leaf.begin + i].prim();
         std::sort(prims_.begin(), prims_.begin() + count_);
     }
     std::span<const std::uint32_t> span() const { return {prims_.data(), count_}; }
@@ -51,19 +42,17 @@ public:
     Emitter(const BinaryTree& tree, const Mesh& mesh, const BuildOptions& options, const std::array<float, 3>& center)
         : tree_(tree), mesh_(mesh), options_(options), center_(center) {}
 
-    struct Size {
-        std::size_t nodes = 0, leaf_units = 0;
-    };
+    using Size = TreeSize;
 
-    EmittedTree emit(unsigned threads) {
+    EmittedTree emit(Threads& threads) {
         // First the top of the tree, which only plans; then each subtree below it, at a place known by its size.
         const Treelet root = gather_root(tree_);
-        std::vector<Subtree> subtrees;
+        std::vector<Part> subtrees;
         Size top = {1, 0};
         plan_top(root, top, subtrees);
-        parallel_for(subtrees.size(), threads, [&](std::size_t i) { subtrees[i].size = measure(subtrees[i].slot); });
+        parallel_for(subtrees.size(), threads, [&](std::size_t i) { subtrees[i].size = size_of(subtrees[i].slot); });
         Size total = top;
-        for (Subtree& subtree : subtrees) {
+        for (Part& subtree : subtrees) {
             subtree.first = total;
             total.nodes += subtree.size.nodes;
             total.leaf_units += subtree.size.leaf_units;
@@ -89,7 +78,7 @@ public:
 
 private:
     // A slot whose whole content one thread emits; its own node's place was given by its parent.
-    struct Subtree {
+    struct Part {
         Slot slot;
         Size size, first;
         std::size_t node = 0;
@@ -99,34 +88,29 @@ private:
 
     static std::uint32_t node_child(std::size_t node) { return inner_child(node * (sizeof(StoredNode) / unit_bytes)); }
 
-    static bool is_top(const Slot& slot) { return !slot.leaf && slot.end - slot.begin > parallel_subtree; }
+    bool is_top(const Slot& slot) const { return !slot.leaf && slot.tree.size() > subtree_size_; }
 
-    void plan_top(const Treelet& treelet, Size& top, std::vector<Subtree>& subtrees) const {
+    void plan_top(const Treelet& treelet, Size& top, std::vector<Part>& subtrees) const {
         for (int i = 0; i < treelet.count; ++i) top.nodes += treelet.slots[static_cast<std::size_t>(i)].leaf ? 0 : 1;
         for (int i = 0; i < treelet.count; ++i) {
             const Slot& slot = treelet.slots[static_cast<std::size_t>(i)];
             if (is_top(slot))
-                plan_top(gather_treelet(tree_, slot.split), top, subtrees);
+                plan_top(gather_treelet(tree_, slot.tree), top, subtrees);
             else
                 subtrees.push_back({slot, {}, {}, 0, 0});
         }
     }
 
-    // Nodes and units of blocks below a slot, without the slot's own node.
-    Size measure(const Slot& slot) const {
-        if (slot.leaf) return {0, Writer::leaf_size(mesh_, LeafPrims(tree_, slot).span()).units};
-        const Treelet treelet = gather_treelet(tree_, slot.split);
-        Size size;
-        for (int i = 0; i < treelet.count; ++i) {
-            const Slot& child = treelet.slots[static_cast<std::size_t>(i)];
-            const Size below = measure(child);
-            size.nodes += below.nodes + (child.leaf ? 0 : 1);
-            size.leaf_units += below.leaf_units;
-        }
-        return size;
+    Size size_of(const Slot& slot) const {
+        return measure(tree_, slot, [&](const Subtree& leaf) -> std::size_t {
+            if constexpr (requires { Writer::leaf_units(leaf.size()); })
+                return Writer::leaf_units(leaf.size());
+            else
+                return Writer::leaf_size(mesh_, LeafPrims(tree_, leaf).span()).units;
+        });
     }
 
-    int emit_top(const Treelet& treelet, std::size_t place, Size& cursor, std::vector<Subtree>& subtrees,
+    int emit_top(const Treelet& treelet, std::size_t place, Size& cursor, std::vector<Part>& subtrees,
                  std::size_t& next_subtree) {
         std::size_t child_node = cursor.nodes;
         for (int i = 0; i < treelet.count; ++i) cursor.nodes += treelet.slots[static_cast<std::size_t>(i)].leaf ? 0 : 1;
@@ -138,10 +122,10 @@ private:
             if (is_top(slot)) {
                 children[static_cast<std::size_t>(i)] = node_child(node);
                 const std::size_t first = next_subtree;
-                deepest = std::max(deepest, emit_top(gather_treelet(tree_, slot.split), node, cursor, subtrees, next_subtree));
+                deepest = std::max(deepest, emit_top(gather_treelet(tree_, slot.tree), node, cursor, subtrees, next_subtree));
                 for (std::size_t k = first; k < next_subtree; ++k) ++subtrees[k].depth;
             } else {
-                Subtree& subtree = subtrees[next_subtree++];
+                Part& subtree = subtrees[next_subtree++];
                 subtree.node = node;
                 subtree.depth = 1;
                 Size at = subtree.first;
@@ -154,7 +138,7 @@ private:
 
     // Returns the depth of the subtree, its root counted.
     int emit_subtree(const Slot& slot, std::size_t place, Size& cursor) {
-        const Treelet treelet = gather_treelet(tree_, slot.split);
+        const Treelet treelet = gather_treelet(tree_, slot.tree);
         Children children{};
         std::size_t child_node = cursor.nodes;
         for (int i = 0; i < treelet.count; ++i) {
@@ -171,27 +155,16 @@ private:
     }
 
     Box box_of(const Slot& slot) const {
+        if (slot.tree.has_node()) return tree_.box_of(slot.tree);
         Box box;
-        if (!slot.leaf || slot.end - slot.begin > block_width) {
-            const BinaryNode& node = tree_.nodes[slot.split];
-            box.lo = Float4v{node.lo[0], node.lo[1], node.lo[2], 0};
-            box.hi = Float4v{node.hi[0], node.hi[1], node.hi[2], 0};
-            return box;
-        }
-        for (std::uint32_t i = slot.begin; i < slot.end; ++i) box.grow(tree_.refs[i].box());
+        for (std::uint32_t i = slot.tree.begin; i < slot.tree.end; ++i) box.grow(tree_.refs[i].box());
         return box;
     }
 
     void write_node(StoredNode& out, const Treelet& treelet, const Children& children) const {
         Node node;
         for (int i = 0; i < node_width; ++i) {
-            const bool used = i < treelet.count;
-            const Box box = used ? box_of(treelet.slots[static_cast<std::size_t>(i)]) : Box{};
-            for (int axis = 0; axis < 3; ++axis) {
-                const float center = center_[static_cast<std::size_t>(axis)];
-                node.planes[2 * axis][i] = used ? plane_below(box.lo[axis], center) : empty_plane;
-                node.planes[2 * axis + 1][i] = used ? plane_above(box.hi[axis], center) : -empty_plane;
-            }
+            write_box(node, i, i < treelet.count ? box_of(treelet.slots[static_cast<std::size_t>(i)]) : Box{}, center_);
             node.child[i] = children[static_cast<std::size_t>(i)];
         }
         const SlotSequences order = options_.order == ChildOrder::treelet    ? treelet.order
@@ -203,7 +176,7 @@ private:
     }
 
     std::uint32_t write_leaf(const Slot& slot, Size& cursor) const {
-        const LeafPrims prims(tree_, slot);
+        const LeafPrims prims(tree_, slot.tree);
         const std::size_t first = cursor.leaf_units;
         const LeafSize size =
             Writer::write_leaf(mesh_, options_.accuracy, prims.span(), leaves_ + first * unit_bytes);
@@ -211,13 +184,11 @@ private:
         return leaf_child(first_leaf_unit_ + first, size.blocks);
     }
 
-    // Larger than any plane with its slack, small enough that no arithmetic on it overflows.
-    static constexpr float empty_plane = 1e24f;
-
     const BinaryTree& tree_;
     const Mesh& mesh_;
     const BuildOptions& options_;
     const std::array<float, 3>& center_;
+    std::uint32_t subtree_size_ = std::clamp(tree_.count / subtree_count, smallest_subtree, largest_subtree);
     StoredNode* nodes_ = nullptr;
     std::byte* leaves_ = nullptr;
     std::size_t first_leaf_unit_ = 0;
@@ -226,7 +197,7 @@ private:
 }  // namespace
 
 EmittedTree emit_tree(const BinaryTree& tree, const Mesh& mesh, const BuildOptions& options,
-                      const std::array<float, 3>& center, unsigned threads) {
+                      const std::array<float, 3>& center, Threads& threads) {
     if (options.nodes == NodeForm::compressed)
         return Emitter<CompressedWriter>(tree, mesh, options, center).emit(threads);
     return Emitter<Float32Writer>(tree, mesh, options, center).emit(threads);

@@ -9,6 +9,7 @@
 #include "builder.h"
 #include "large_array.h"
 #include "mesh.h"
+#include "parallel.h"
 
 namespace wive {
 
@@ -27,10 +28,6 @@ struct LeafSize {
 // Children of a node stand side by side, then subtree after subtree; the same on any number of threads. Throws
 // std::invalid_argument where the tree is larger than child references reach.
 EmittedTree emit_tree(const BinaryTree& tree, const Mesh& mesh, const BuildOptions& options,
-                      const std::array<float, 3>& center, unsigned threads);
-
-// Planes relative to the centre, rounded outwards so that a box never shrinks.
-float plane_below(float plane, float center);
-float plane_above(float plane, float center);
+                      const std::array<float, 3>& center, Threads& threads);
 
 }  // namespace wive

@@ -54,8 +54,9 @@ void Gathering::write_offsets(std::int64_t* offsets) const {
 }
 
 void Gathering::sort_into(const SortedHits& hits) {
+    Threads threads(threads_);
     // A ray is traced by one worker, so its hits are in one list and its count has one writer.
-    parallel_for(lists_.size(), threads_, [&](std::size_t i) {
+    parallel_for(lists_.size(), threads, [&](std::size_t i) {
         lists_[i].drain([&](const FoundHit& hit) {
             const std::size_t row = static_cast<std::size_t>(hits.offsets[hit.ray] + --counts_[hit.ray]);
             hits.t[row] = hit.t;
@@ -64,7 +65,7 @@ void Gathering::sort_into(const SortedHits& hits) {
             hits.uv[2 * row + 1] = hit.v;
         });
     });
-    parallel_chunks(counts_.size(), rays_per_sort, threads_, [&](std::size_t begin, std::size_t end) {
+    parallel_chunks(counts_.size(), rays_per_sort, threads, [&](std::size_t begin, std::size_t end) {
         std::vector<Hit> together;
         for (std::size_t i = begin; i < end; ++i) {
             const auto first = static_cast<std::size_t>(hits.offsets[i]), last = static_cast<std::size_t>(hits.offsets[i + 1]);

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 #include <atomic>
-#include <cmath>
+#include <cstring>
 #include <limits>
 #include <sstream>
 #include <stdexcept>
@@ -17,11 +17,12 @@ namespace {
 
 constexpr std::size_t chunk_size = 1 << 14;
 
-// The lowest index in [0, count) for which is_bad holds, or count.
-template <class IsBad>
-std::size_t first_bad(std::size_t count, unsigned threads, const IsBad& is_bad) {
+// The lowest index in [0, count) for which is_bad holds, or count. Chunks are asked as a whole first, by has_bad.
+template <class HasBad, class IsBad>
+std::size_t first_bad(std::size_t count, Threads& threads, const HasBad& has_bad, const IsBad& is_bad) {
     std::atomic<std::size_t> first{count};
     parallel_chunks(count, chunk_size, threads, [&](std::size_t begin, std::size_t end) {
+        if (!has_bad(begin, end)) return;
         for (std::size_t i = begin; i < end; ++i) {
             if (!is_bad(i)) continue;
             std::size_t seen = first.load();
@@ -33,52 +34,72 @@ std::size_t first_bad(std::size_t count, unsigned threads, const IsBad& is_bad) 
     return first.load();
 }
 
-// Whether the three corners lie on one line, decided exactly: they do where all three projections have area zero.
-bool has_no_area(const float* a, const float* b, const float* c) {
-    // Filter: a component of the cross product in double, larger than its rounding error, settles it.
-    constexpr double error = 8 * std::numeric_limits<double>::epsilon();
-    double u[3], v[3];
-    for (int k = 0; k < 3; ++k) {
-        u[k] = static_cast<double>(b[k]) - a[k];
-        v[k] = static_cast<double>(c[k]) - a[k];
-    }
-    for (int k = 0; k < 3; ++k) {
-        const int i = (k + 1) % 3, j = (k + 2) % 3;
-        const double left = u[i] * v[j], right = u[j] * v[i];
-        if (std::abs(left - right) > error * (std::abs(left) + std::abs(right))) return false;
-    }
+// Whether the three corners don't lie on one line, decided exactly: they do where all three projections have area zero.
+bool has_area(const float* a, const float* b, const float* c) {
     for (int k = 0; k < 3; ++k) {
         const int i = (k + 1) % 3, j = (k + 2) % 3;
         const float p[2] = {a[i], a[j]}, q[2] = {b[i], b[j]}, r[2] = {c[i], c[j]};
-        if (orientation(p, q, r) != 0) return false;
+        if (orientation(p, q, r) != 0) return true;
     }
-    return true;
+    return false;
+}
+
+// Settles it for most: some component of the cross product is larger than its rounding error. Differences and products
+// are off by a unit roundoff u each, sums of two by another: 4u of both products' sizes, taken twice as large, and what
+// underflow may add.
+bool surely_has_area(Float4v a, Float4v b, Float4v c) {
+    constexpr float error = 4 * std::numeric_limits<float>::epsilon(), underflow = 4 * std::numeric_limits<float>::min();
+    const Float4v u = b - a, v = c - a;
+    const auto yzx = [](Float4v x) { return __builtin_shufflevector(x, x, 1, 2, 0, 3); };
+    const Float4v left = u * yzx(v), right = yzx(u) * v;
+    const Float4v cross = left - right, zero = {};
+    const auto magnitude = [&](Float4v x) { return maximum(x, zero - x); };
+    const Int4v sure = magnitude(cross) > error * (magnitude(left) + magnitude(right)) + underflow;
+    return (sure[0] | sure[1] | sure[2]) != 0;
+}
+
+// A vertex, with a zero in the fourth lane.
+Float4v load_vertex(const Mesh& mesh, std::int32_t index) {
+    const float* v = mesh.vertices + 3 * static_cast<std::size_t>(index);
+    if (static_cast<std::size_t>(index) + 1 == mesh.vertex_count) return Float4v{v[0], v[1], v[2], 0};
+    Int4v bits;
+    std::memcpy(&bits, v, sizeof bits);
+    const Int4v xyz = {-1, -1, -1, 0};
+    return std::bit_cast<Float4v>(bits & xyz);
 }
 
 }  // namespace
 
-void check_mesh(const Mesh& mesh, unsigned threads) {
+void check_mesh(const Mesh& mesh, Threads& threads) {
     if (mesh.vertex_count > std::numeric_limits<std::int32_t>::max())
         throw std::invalid_argument("vertices: expected at most 2147483647, split the mesh into several scenes");
-    const auto bad_vertex = [&](std::size_t i) {
-        for (int k = 0; k < 3; ++k)
-            if (!(std::abs(mesh.vertices[3 * i + static_cast<std::size_t>(k)]) <= max_coordinate)) return true;
-        return false;
+    // Without a branch, so that compilers take several at a time. Bits of magnitudes compare as the magnitudes do,
+    // those of infinities and NaNs above all others.
+    const auto bad_vertices = [&](std::size_t begin, std::size_t end) {
+        std::int32_t bad = 0;
+        for (std::size_t i = 3 * begin; i < 3 * end; ++i)
+            bad |= std::bit_cast<std::int32_t>(max_coordinate) - (std::bit_cast<std::int32_t>(mesh.vertices[i]) & 0x7fffffff);
+        return bad < 0;
     };
-    if (const std::size_t i = first_bad(mesh.vertex_count, threads, bad_vertex); i < mesh.vertex_count) {
+    const auto bad_vertex = [&](std::size_t i) { return bad_vertices(i, i + 1); };
+    if (const std::size_t i = first_bad(mesh.vertex_count, threads, bad_vertices, bad_vertex); i < mesh.vertex_count) {
         const float* v = mesh.vertices + 3 * i;
         std::ostringstream text;
         text << "vertices[" << i << "] = (" << v[0] << ", " << v[1] << ", " << v[2]
              << "): expected finite coordinates of at most 1e18 in magnitude; remove or repair this vertex";
         throw std::invalid_argument(text.str());
     }
-    const auto bad_face = [&](std::size_t i) {
-        for (std::size_t k = 0; k < 3; ++k)
-            if (static_cast<std::size_t>(static_cast<std::uint32_t>(mesh.faces[3 * i + k])) >= mesh.vertex_count)
-                return true;
-        return false;
+    const auto bad_faces = [&](std::size_t begin, std::size_t end) {
+        const std::uint32_t last = static_cast<std::uint32_t>(mesh.vertex_count) - 1;
+        std::uint32_t bad = mesh.vertex_count == 0 ? ~0u : 0;
+        for (std::size_t i = 3 * begin; i < 3 * end; ++i) {
+            const std::uint32_t index = static_cast<std::uint32_t>(mesh.faces[i]);
+            bad |= index | (last - index);
+        }
+        return static_cast<std::int32_t>(bad) < 0;
     };
-    if (const std::size_t i = first_bad(mesh.face_count, threads, bad_face); i < mesh.face_count) {
+    const auto bad_face = [&](std::size_t i) { return bad_faces(i, i + 1); };
+    if (const std::size_t i = first_bad(mesh.face_count, threads, bad_faces, bad_face); i < mesh.face_count) {
         const std::int32_t* f = mesh.faces + 3 * i;
         std::ostringstream text;
         text << "faces[" << i << "] = (" << f[0] << ", " << f[1] << ", " << f[2] << "): expected indices in 0.."
@@ -87,29 +108,48 @@ void check_mesh(const Mesh& mesh, unsigned threads) {
     }
 }
 
-LargeArray<PrimRef> make_prim_refs(const Mesh& mesh, unsigned threads, std::size_t& count) {
-    LargeArray<PrimRef> refs(mesh.face_count);
+bool box_triangle(const Mesh& mesh, std::size_t face, Box& box) {
+    const std::int32_t* corners = mesh.faces + 3 * face;
+    const Float4v a = load_vertex(mesh, corners[0]), b = load_vertex(mesh, corners[1]),
+                  c = load_vertex(mesh, corners[2]);
+    box = {minimum(minimum(a, b), c), maximum(maximum(a, b), c)};
+    return surely_has_area(a, b, c) || has_area(mesh.corner(face, 0), mesh.corner(face, 1), mesh.corner(face, 2));
+}
+
+PrimRefs make_prim_refs(const Mesh& mesh, Threads& threads) {
+    PrimRefs all;
+    all.refs = LargeArray<PrimRef>(mesh.face_count);
     const std::size_t chunks = (mesh.face_count + chunk_size - 1) / chunk_size;
-    std::vector<std::size_t> kept(chunks);
+    struct Part {
+        std::size_t count = 0;
+        Box box, centroids;
+    };
+    std::vector<Part> parts(chunks);
     parallel_chunks(mesh.face_count, chunk_size, threads, [&](std::size_t begin, std::size_t end) {
-        std::size_t to = begin;
+        PrimRef* to = all.refs.data() + begin;
+        Part part;
         for (std::size_t face = begin; face < end; ++face) {
-            const float *a = mesh.corner(face, 0), *b = mesh.corner(face, 1), *c = mesh.corner(face, 2);
-            if (has_no_area(a, b, c)) continue;
             Box box;
-            for (const float* v : {a, b, c}) box.grow(Float4v{v[0], v[1], v[2], 0.0f});
-            box.lo[3] = std::bit_cast<float>(static_cast<std::uint32_t>(face));
-            refs[to++] = {box.lo, box.hi};
+            if (!box_triangle(mesh, face, box)) continue;
+            part.box.grow(box);
+            part.centroids.grow(box.lo + box.hi);
+            PrimRef ref = {box.lo, box.hi};
+            ref.lo[3] = std::bit_cast<float>(static_cast<std::uint32_t>(face));
+            *to++ = ref;
         }
-        kept[begin / chunk_size] = to - begin;
+        part.count = static_cast<std::size_t>(to - (all.refs.data() + begin));
+        parts[begin / chunk_size] = part;
     });
-    count = 0;  // close the gaps that left-out triangles made; usually there is none and nothing moves
+    std::size_t count = 0;  // close the gaps that left-out triangles made; usually there is none and nothing moves
     for (std::size_t i = 0; i < chunks; ++i) {
-        const std::size_t from = i * chunk_size;
-        if (count != from) std::copy(refs.data() + from, refs.data() + from + kept[i], refs.data() + count);
-        count += kept[i];
+        const PrimRef* from = all.refs.data() + i * chunk_size;
+        if (count != i * chunk_size) std::copy(from, from + parts[i].count, all.refs.data() + count);
+        count += parts[i].count;
+        all.box.grow(parts[i].box);
+        all.centroids.grow(parts[i].centroids);
     }
-    return refs;
+    all.count = static_cast<std::uint32_t>(count);
+    return all;
 }
 
 }  // namespace wive

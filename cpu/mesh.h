@@ -7,6 +7,7 @@
 
 #include "box.h"
 #include "large_array.h"
+#include "parallel.h"
 
 namespace wive {
 
@@ -29,7 +30,6 @@ struct PrimRef {
     Box box() const { return {lo, hi}; }
     // Twice the box's centre. The number's bits are cleared first: as a float they would be a slow denormal.
     Float4v centroid() const {
-        typedef std::int32_t Int4v __attribute__((vector_size(16)));
         const Int4v xyz = {-1, -1, -1, 0};
         return std::bit_cast<Float4v>(std::bit_cast<Int4v>(lo) & xyz) + hi;
     }
@@ -37,9 +37,18 @@ struct PrimRef {
 
 // Throws std::invalid_argument naming the first vertex that is not a usable number, or the first face that
 // points outside the vertices.
-void check_mesh(const Mesh& mesh, unsigned threads);
+void check_mesh(const Mesh& mesh, Threads& threads);
+
+// The box of a triangle; false where it has no area, decided exactly.
+bool box_triangle(const Mesh& mesh, std::size_t face, Box& box);
+
+struct PrimRefs {
+    LargeArray<PrimRef> refs;
+    std::uint32_t count = 0;
+    Box box, centroids;  // round all of them
+};
 
 // One reference for each triangle with an area; zero-area triangles can't be hit and are left out.
-LargeArray<PrimRef> make_prim_refs(const Mesh& mesh, unsigned threads, std::size_t& count);
+PrimRefs make_prim_refs(const Mesh& mesh, Threads& threads);
 
 }  // namespace wive

@@ -9,16 +9,6 @@
 
 namespace wive {
 
-SlotSequences join(const SlotSequences& left, int left_count, const SlotSequences& right, int right_count, int axis) {
-    SlotSequences joined;
-    for (unsigned octant = 0; octant < 8; ++octant) {
-        const bool negative = octant >> axis & 1u;
-        joined[octant] = negative ? right[octant] | left[octant] << 4 * right_count
-                                  : left[octant] | right[octant] << 4 * left_count;
-    }
-    return joined;
-}
-
 namespace {
 
 // The slots by rising key.
@@ -112,11 +102,21 @@ SlotSequences shuffle(const Node& node, int children) {
 void write_order(Node& node, SlotSequences sequences, int children) {
     for (int i = children; i < node_width; ++i)
         for (std::uint32_t& sequence : sequences) sequence |= static_cast<std::uint32_t>(i) << 4 * i;
-    for (int i = 0; i < node_width; ++i) {
-        std::uint32_t lane = 0;
-        for (int octant = 0; octant < 8; ++octant)
-            lane |= (sequences[static_cast<std::size_t>(octant)] >> 4 * i & 15u) << 4 * octant;
-        node.order[i] = lane;
+    // Eight rows of eight nibbles, transposed: first the nibbles of two octants become bytes, those of even and of odd
+    // lanes apart, then the bytes of four pairs a word.
+    std::array<std::uint32_t, 4> even, odd;
+    for (std::size_t pair = 0; pair < 4; ++pair) {
+        const std::uint32_t a = sequences[2 * pair], b = sequences[2 * pair + 1];
+        even[pair] = (a & 0x0f0f0f0fu) | (b & 0x0f0f0f0fu) << 4;
+        odd[pair] = (a >> 4 & 0x0f0f0f0fu) | (b & 0xf0f0f0f0u);
+    }
+    const auto bytes = [](const std::array<std::uint32_t, 4>& words, int i) {
+        const auto byte = [&](std::size_t pair) { return words[pair] >> 8 * i & 255u; };
+        return byte(0) | byte(1) << 8 | byte(2) << 16 | byte(3) << 24;
+    };
+    for (int i = 0; i < node_width / 2; ++i) {
+        node.order[2 * i] = bytes(even, i);
+        node.order[2 * i + 1] = bytes(odd, i);
     }
 }
 

@@ -14,7 +14,7 @@ namespace wive {
 enum class ChildOrder { treelet, diagonal, slots, none };
 
 // For each octant, slots from front to back, four bits each, the first in the lowest bits.
-using SlotSequences = std::array<std::uint32_t, 8>;
+struct alignas(16) SlotSequences : std::array<std::uint32_t, 8> {};
 
 // The sequence of a single slot, and of two treelets of which the ray meets `left` first where it is positive on
 // the axis. left_count: how many slots the left treelet has.
@@ -23,7 +23,20 @@ constexpr SlotSequences single_slot(std::uint32_t slot) {
     s.fill(slot);
     return s;
 }
-SlotSequences join(const SlotSequences& left, int left_count, const SlotSequences& right, int right_count, int axis);
+inline SlotSequences join(const SlotSequences& left, int left_count, const SlotSequences& right, int right_count,
+                          int axis) {
+    static constexpr std::uint32_t no = 0, yes = ~0u;
+    alignas(16) static constexpr std::uint32_t is_negative[3][8] = {
+        {no, yes, no, yes, no, yes, no, yes}, {no, no, yes, yes, no, no, yes, yes}, {no, no, no, no, yes, yes, yes, yes}};
+    SlotSequences joined;
+    for (std::size_t octant = 0; octant < 8; ++octant) {
+        const std::uint32_t forwards = left[octant] | right[octant] << 4 * left_count;
+        const std::uint32_t backwards = right[octant] | left[octant] << 4 * right_count;
+        const std::uint32_t negative = is_negative[axis][octant];
+        joined[octant] = (forwards & ~negative) | (backwards & negative);
+    }
+    return joined;
+}
 
 // Slots sorted by their boxes' centres along each octant's diagonal.
 SlotSequences sort_along_diagonals(const Node& node, int children);

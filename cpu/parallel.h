@@ -3,8 +3,10 @@
 
 #include <algorithm>
 #include <atomic>
+#include <condition_variable>
 #include <cstddef>
 #include <exception>
+#include <mutex>
 #include <thread>
 #include <vector>
 
@@ -24,39 +26,115 @@ inline unsigned thread_count(unsigned asked) {
     return std::max(1u, std::thread::hardware_concurrency());
 }
 
-// Calls work(i) once for every i in [0, count), on the calling thread and up to threads - 1 more.
-// The first exception of any of them is thrown again here, once all have stopped.
-template <class Work>
-void parallel_for(std::size_t count, unsigned threads, const Work& work) {
-    std::atomic<std::size_t> next{0};
-    std::atomic<bool> failed{false};
-    std::exception_ptr failure;
-    auto run = [&] {
-        try {
-            for (std::size_t i; (i = next.fetch_add(1, std::memory_order_relaxed)) < count;) work(i);
-        } catch (...) {
-            if (!failed.exchange(true)) failure = std::current_exception();
-            next.store(count, std::memory_order_relaxed);
+// The calling thread and, once there is work for them, up to count - 1 helpers, which sleep between one piece of work
+// and the next and end with this object. A helper that the system has not woken yet is not waited for, so on a busy
+// machine the caller goes on alone.
+class Threads {
+public:
+    explicit Threads(unsigned count) : count_(count) {}
+    Threads(const Threads&) = delete;
+    Threads& operator=(const Threads&) = delete;
+    ~Threads() {
+        {
+            const std::lock_guard lock(mutex_);
+            ending_ = true;
+        }
+        wake_.notify_all();
+        for (std::thread& helper : helpers_) helper.join();
+    }
+
+    // Calls work(i) once for every i in [0, count). The first exception of any of them is thrown again here, once all
+    // have stopped.
+    template <class Work>
+    void for_each(std::size_t count, const Work& work) {
+        Job job = {count, [](const void* w, std::size_t i) { (*static_cast<const Work*>(w))(i); }, &work};
+        const std::size_t wanted = std::min<std::size_t>(count_, count);
+        if (wanted > 1) offer(job, wanted - 1);
+        job.run();
+        if (wanted > 1) withdraw();
+        if (job.failure) std::rethrow_exception(job.failure);
+    }
+
+private:
+    struct Job {
+        std::size_t count;
+        void (*call)(const void* work, std::size_t i);
+        const void* work;
+        std::atomic<std::size_t> next{0};
+        std::atomic<bool> failed{false};
+        std::exception_ptr failure{};
+
+        void run() {
+            try {
+                for (std::size_t i; (i = next.fetch_add(1, std::memory_order_relaxed)) < count;) call(work, i);
+            } catch (...) {
+                if (!failed.exchange(true)) failure = std::current_exception();
+                next.store(count, std::memory_order_relaxed);
+            }
         }
     };
-    const std::size_t helpers = std::min<std::size_t>(threads, count) - (count > 0 ? 1 : 0);
-    std::vector<std::thread> pool;
-    pool.reserve(helpers);
-    try {
-        while (pool.size() < helpers) pool.emplace_back(run);
-    } catch (...) {
-        // The machine has no more threads to give: the ones we have do the work.
+
+    void offer(Job& job, std::size_t helpers) {
+        try {
+            while (helpers_.size() < helpers) helpers_.emplace_back([this] { help(); });
+        } catch (...) {
+            // The machine has no more threads to give: the ones we have do the work.
+        }
+        {
+            const std::lock_guard lock(mutex_);
+            job_ = &job;
+            ++job_number_;
+        }
+        wake_.notify_all();
     }
-    run();
-    for (std::thread& thread : pool) thread.join();
-    if (failure) std::rethrow_exception(failure);
+
+    void withdraw() {
+        std::unique_lock lock(mutex_);
+        job_ = nullptr;
+        idle_.wait(lock, [this] { return working_ == 0; });
+    }
+
+    void help() {
+        std::unique_lock lock(mutex_);
+        for (std::size_t last = 0;;) {
+            wake_.wait(lock, [&] { return ending_ || (job_ && job_number_ != last); });
+            if (ending_) return;
+            last = job_number_;
+            Job& job = *job_;
+            ++working_;
+            lock.unlock();
+            job.run();
+            lock.lock();
+            if (--working_ == 0) idle_.notify_one();
+        }
+    }
+
+    const unsigned count_;
+    std::vector<std::thread> helpers_;
+    std::mutex mutex_;
+    std::condition_variable wake_, idle_;
+    Job* job_ = nullptr;          // null: nothing to do
+    std::size_t job_number_ = 0;  // so that a helper takes each job once
+    unsigned working_ = 0;
+    bool ending_ = false;
+};
+
+template <class Work>
+void parallel_for(std::size_t count, Threads& threads, const Work& work) {
+    threads.for_each(count, work);
+}
+
+// The same on threads of its own.
+template <class Work>
+void parallel_for(std::size_t count, unsigned threads, const Work& work) {
+    Threads(threads).for_each(count, work);
 }
 
 // The same in chunks of a fixed size: work(begin, end). Chunks do not depend on the number of threads.
 template <class Work>
-void parallel_chunks(std::size_t count, std::size_t chunk, unsigned threads, const Work& work) {
-    parallel_for((count + chunk - 1) / chunk, threads,
-                 [&](std::size_t i) { work(i * chunk, std::min(count, (i + 1) * chunk)); });
+void parallel_chunks(std::size_t count, std::size_t chunk, Threads& threads, const Work& work) {
+    threads.for_each((count + chunk - 1) / chunk,
+                     [&](std::size_t i) { work(i * chunk, std::min(count, (i + 1) * chunk)); });
 }
 
 }  // namespace wive

@@ -18,9 +18,8 @@ struct Float32Writer {
     using Block = TriangleBlock;
 
     static void write_node(const wive::Node& node, int, Node& out) { out = node; }
-    static LeafSize leaf_size(const Mesh&, std::span<const std::uint32_t> prims) {
-        const std::uint32_t blocks = blocks_for(static_cast<std::uint32_t>(prims.size()));
-        return {blocks * (sizeof(Block) / unit_bytes), blocks};
+    static constexpr std::size_t leaf_units(std::uint32_t triangles) {
+        return blocks_for(triangles) * (sizeof(Block) / unit_bytes);
     }
     static LeafSize write_leaf(const Mesh& mesh, Accuracy accuracy, std::span<const std::uint32_t> prims, std::byte* out);
 };

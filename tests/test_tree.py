@@ -58,17 +58,24 @@ def mesh(request: pytest.FixtureRequest) -> tuple[np.ndarray, np.ndarray]:
     return MESHES[request.param]
 
 
-def test_every_triangle_stands_in_exactly_one_leaf(mesh: tuple[np.ndarray, np.ndarray]) -> None:
-    bvh = _cpu.Bvh(*mesh)
+@pytest.fixture(params=["medium", "high"])
+def bvh(request: pytest.FixtureRequest, mesh: tuple[np.ndarray, np.ndarray]) -> _cpu.Bvh:
+    return _cpu.Bvh(*mesh, quality=request.param)
+
+
+def test_every_triangle_stands_in_exactly_one_leaf(
+    mesh: tuple[np.ndarray, np.ndarray], bvh: _cpu.Bvh
+) -> None:
     blocks = [block for *_, child in walk(bvh) if child >= LEAF for block in leaf_blocks(bvh, child)]
     assert sorted(blocks) == list(range(len(bvh.blocks)))
     prims = bvh.blocks[:, 9].view(np.int32).ravel()
     assert sorted(prims[prims >= 0]) == list(range(len(mesh[1])))
 
 
-def test_every_box_holds_its_triangles_and_its_childrens_boxes(mesh: tuple[np.ndarray, np.ndarray]) -> None:
+def test_every_box_holds_its_triangles_and_its_childrens_boxes(
+    mesh: tuple[np.ndarray, np.ndarray], bvh: _cpu.Bvh
+) -> None:
     vertices, faces = mesh
-    bvh = _cpu.Bvh(vertices, faces)
     low, high = planes(bvh)
     used = used_lanes(bvh)
     for node, lane, _, child in walk(bvh):
@@ -92,10 +99,7 @@ def test_blocks_hold_the_callers_vertices_bit_for_bit() -> None:
     assert np.isnan(rows.transpose(0, 2, 1)[prims < 0]).all()
 
 
-def test_order_is_a_permutation_and_the_opposite_octant_reverses_it(
-    mesh: tuple[np.ndarray, np.ndarray],
-) -> None:
-    bvh = _cpu.Bvh(*mesh)
+def test_order_is_a_permutation_and_the_opposite_octant_reverses_it(bvh: _cpu.Bvh) -> None:
     counts = used_lanes(bvh).sum(axis=1)
     for node, count in enumerate(counts):
         orders = [bvh.nodes[node, 7] >> np.uint32(4 * octant) & np.uint32(7) for octant in range(8)]
@@ -125,20 +129,26 @@ def test_zero_area_triangles_are_left_out_and_keep_their_numbers() -> None:
     assert list(prims[prims >= 0]) == [1]
 
 
+@pytest.mark.parametrize("quality", ["medium", "high"])
 @pytest.mark.parametrize("accuracy", ["fast", "watertight"])
-def test_the_tree_does_not_depend_on_threads(accuracy: str) -> None:
+def test_the_tree_does_not_depend_on_threads(accuracy: str, quality: str) -> None:
     vertices, faces = soup(300_000, seed=4, size=0.01)  # enough for ranges that all threads split together
-    one, many = (_cpu.Bvh(vertices, faces, accuracy, threads=threads) for threads in (1, 5))
+    one, many = (_cpu.Bvh(vertices, faces, accuracy, threads=threads, quality=quality) for threads in (1, 5))
     assert np.array_equal(one.units, many.units)
 
 
-def test_depth_keeps_its_limit_where_surface_area_would_peel_off_a_few_triangles_at_a_time() -> None:
+@pytest.mark.parametrize("quality", ["medium", "high"])
+def test_depth_keeps_its_limit_where_surface_area_would_peel_off_a_few_triangles_at_a_time(
+    quality: str,
+) -> None:
     # Small triangles at exponentially growing distances on three axes: each split takes off the last few.
     steps = 1.3 ** np.arange(-300.0, 150.0)
     small = np.array([[0, 0, 0], [1e-3, 0, 0], [0, 1e-3, 1e-3]])
     corners = np.concatenate([(small + np.eye(3)[axis]) * steps[:, None, None] for axis in range(3)])
     vertices, faces = corners.astype(np.float32).reshape(-1, 3), np.arange(3 * len(corners), dtype=np.int32)
-    deep, shallow = (_cpu.Bvh(vertices, faces.reshape(-1, 3), depth_limit=limit) for limit in (64, 10))
+    deep, shallow = (
+        _cpu.Bvh(vertices, faces.reshape(-1, 3), depth_limit=limit, quality=quality) for limit in (64, 10)
+    )
     assert 10 < deep.depth <= 64
     assert shallow.depth <= 10
     for bvh in (deep, shallow):

@@ -19,7 +19,7 @@ def kernels() -> dict[str, str]:
     """
 
 class Bvh:
-    """The 8-wide tree over one mesh: built once, never changed, shared by every backend."""
+    """The 8-wide tree over one mesh: never changed, shared by every backend."""
 
     def __init__(
         self,
@@ -30,12 +30,21 @@ class Bvh:
         threads: int = 0,
         depth_limit: int = 64,
         nodes: Literal["float32", "compressed"] = "float32",
+        quality: Literal["medium", "high"] = "medium",
     ) -> None:
         """Build over vertices (v,3), faces (f,3). threads 0 means every core.
 
         Raises ValueError naming the first bad vertex (NaN, infinite or beyond 1e18) or face (index out of
         range).
         """
+    def refitted(self, vertices: NDArray[np.float32], threads: int = 0) -> Bvh:
+        """A tree over the same faces and moved vertices (v,3), of the same shape.
+
+        Of another shape where a triangle without an area gains some. Raises ValueError as construction does.
+        """
+    @property
+    def vertices(self) -> NDArray[np.float32]:
+        """(v,3) the array it was built from."""
     @property
     def nodes(self) -> NDArray[np.uint32]:
         """(m,8,8) read-only view, rows lo.x hi.x lo.y hi.y lo.z hi.z child order; planes are float32 bits.

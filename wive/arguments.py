@@ -68,12 +68,7 @@ def vector(name: str, value: ArrayLike) -> NDArray[np.float64]:
 
 def mesh(vertices: ArrayLike, faces: ArrayLike) -> tuple[Float32, Int32]:
     """Vertices (v,3) float32 and faces (f,3) int32, C-contiguous; arrays that are so are not copied."""
-    points = _numeric("vertices", vertices, "a (v, 3) array of real numbers", "fiu")
-    if points.shape == (0,):
-        points = points.reshape(0, 3)
-    if points.ndim != 2 or points.shape[1] != 3:
-        raise ValueError(f"vertices must have shape (v, 3), got {points.shape}")
-
+    points = _positions(vertices)
     corners = _numeric("faces", faces, "an (f, 3) array of integers", "iu", "round them to integer indices")
     if corners.shape == (0,):
         corners = corners.reshape(0, 3)
@@ -87,6 +82,24 @@ def mesh(vertices: ArrayLike, faces: ArrayLike) -> tuple[Float32, Int32]:
             f"faces must index the {len(points)} vertices from 0, got {corners[face].tolist()} in face {face}"
         )
     return _float32(points), np.require(corners, np.int32, ["C", "A"])
+
+
+def moved_vertices(vertices: ArrayLike, count: int) -> Float32:
+    """New positions (count,3) float32, C-contiguous; an array that is so is not copied."""
+    points = _positions(vertices)
+    if len(points) != count:
+        raise ValueError(
+            f"vertices must have shape ({count}, 3), as the scene's own, got {points.shape}: "
+            "make a new Scene for another mesh"
+        )
+    return _float32(points)
+
+
+def read_only(array: NDArray[Any]) -> NDArray[Any]:
+    """The same array, which can't be written to through this view."""
+    view = array.view(np.ndarray)
+    view.flags.writeable = False
+    return view
 
 
 def rays(
@@ -162,6 +175,15 @@ def _is_ready(value: ArrayLike) -> TypeGuard[Float32]:
         and (flags := value.flags).c_contiguous
         and flags.aligned
     )
+
+
+def _positions(vertices: ArrayLike) -> NDArray[Any]:
+    points = _numeric("vertices", vertices, "a (v, 3) array of real numbers", "fiu")
+    if points.shape == (0,):
+        points = points.reshape(0, 3)
+    if points.ndim != 2 or points.shape[1] != 3:
+        raise ValueError(f"vertices must have shape (v, 3), got {points.shape}")
+    return points
 
 
 def _vectors(name: str, value: ArrayLike) -> Float32:

@@ -21,7 +21,6 @@ class CrossingQueries:
     """The part of `wive.Scene` that does not stop at the first hit."""
 
     _bvh: _cpu.Bvh
-    _vertices: NDArray[np.float32]
     _faces: NDArray[np.int32]
     _backend: str
     _device: str | None
@@ -83,8 +82,9 @@ class CrossingQueries:
         if self._warp is not None:
             hits, counts = self._warp.intersect_all(rays, chosen, bool(stats))
         else:
-            offsets, t, prim, uv, table = self._bvh.intersect_all(self._backend, *rays.numpy(), *work)
-            hits = AllHits(offsets, t, prim, uv, self._vertices, self._faces)
+            bvh = self._bvh
+            offsets, t, prim, uv, table = bvh.intersect_all(self._backend, *rays.numpy(), *work)
+            hits = AllHits(offsets, t, prim, uv, bvh.vertices, self._faces)
             counts = stats_of(table, rays.library)
             if rays.library is not NUMPY:
                 hits = WrappedAllHits(hits, rays.library.from_numpy)

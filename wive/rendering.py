@@ -105,7 +105,8 @@ def _rows_renderer(scene: Scene, frame: Image, image: Image, settings: Settings)
 
         return PictureRenderer(scene._warp, frame, image, *what).render_rows
     threads = arguments.threads(settings.threads)
-    return lambda begin, end: scene._bvh.render_rows(scene.backend, frame, image, begin, end, *what, threads)
+    bvh = scene._bvh  # one picture shows one shape, whatever refits happen meanwhile
+    return lambda begin, end: bvh.render_rows(scene.backend, frame, image, begin, end, *what, threads)
 
 
 def check_png_output(path: PathLike) -> str:

@@ -14,6 +14,7 @@ from wive.files import PathLike
 from wive.hits import Hits, Stats, WrappedHits, stats_of
 from wive.meshfile import load_mesh
 from wive.rays import check_rays
+from wive.refit import Refittable
 from wive.storage import Options, read_scene, write_scene
 
 if TYPE_CHECKING:
@@ -21,13 +22,13 @@ if TYPE_CHECKING:
     from wive.warp_tracer import WarpTracer
 
 
-class Scene(CrossingQueries):
+class Scene(Refittable, CrossingQueries):
     """A triangle mesh that answers ray queries.
 
-    A scene never changes, so several threads may query it at once, and so may processes forked from this one.
+    Several threads may query it at once, and so may processes forked from this one. Only `refit` changes it,
+    all at once: a query sees the old positions or the new ones.
     """
 
-    _bvh: _cpu.Bvh
     _warp: "WarpTracer | None" = None
 
     def __init__(
@@ -39,6 +40,7 @@ class Scene(CrossingQueries):
         device: str | None = None,
         accuracy: Literal["fast", "watertight", "exact"] = "watertight",
         nodes: Literal["float32", "compressed"] = "float32",
+        quality: Literal["medium", "high"] = "medium",
     ) -> None:
         """Build the tree.
 
@@ -53,6 +55,8 @@ class Scene(CrossingQueries):
                 or "exact" (hits, their order, t and uv are those of exact arithmetic, rounded once).
             nodes: "float32", or "compressed": the same hits from a tree of less than two thirds the bytes;
                 slower where trees fit into the processor's caches, faster where they don't.
+            quality: "medium", or "high" for a tree that takes about four times as long to build and gives
+                the same hits in fewer steps: a sixth fewer where sizes differ much, none in even meshes.
 
         C-contiguous float32 vertices and int32 faces are kept, not copied: don't change them afterwards.
 
@@ -61,15 +65,18 @@ class Scene(CrossingQueries):
         """
         arguments.choice("accuracy", accuracy, ("fast", "watertight", "exact"))
         arguments.choice("nodes", nodes, ("float32", "compressed"))
-        self._options = Options(backend=backend, device=device, accuracy=accuracy, nodes=nodes)
+        arguments.choice("quality", quality, ("medium", "high"))
+        self._options = Options(
+            backend=backend, device=device, accuracy=accuracy, nodes=nodes, quality=quality
+        )
         self._backend, self._device = resolve_backend(backend, device)
         mesh = arguments.mesh(host_array("vertices", vertices), host_array("faces", faces))
-        self._vertices, self._faces = map(_read_only, mesh)
-        self._bvh = _cpu.Bvh(self._vertices, self._faces, accuracy, nodes=nodes)
+        vertices, self._faces = map(arguments.read_only, mesh)
+        self._bvh = _cpu.Bvh(vertices, self._faces, accuracy, nodes=nodes, quality=quality)
         if self._device is not None:
             from wive.warp_tracer import WarpTracer
 
-            self._warp = WarpTracer(self._bvh, self._vertices, self._faces, self._device)
+            self._warp = WarpTracer(self._bvh, vertices, self._faces, self._device)
 
     @classmethod
     def from_file(cls, path: PathLike, **kwargs: Any) -> "Scene":
@@ -143,8 +150,9 @@ class Scene(CrossingQueries):
         if self._warp is not None:
             hits, counts = self._warp.intersect(rays, chosen, bool(stats))
         else:
-            t, prim, uv, table = self._bvh.intersect(self._backend, *rays.numpy(), *work)
-            hits, counts = Hits(t, prim, uv, self._vertices, self._faces), stats_of(table, rays.library)
+            bvh = self._bvh
+            t, prim, uv, table = bvh.intersect(self._backend, *rays.numpy(), *work)
+            hits, counts = Hits(t, prim, uv, bvh.vertices, self._faces), stats_of(table, rays.library)
             if rays.library is not NUMPY:
                 hits = WrappedHits(hits, rays.library.from_numpy)
         return hits if counts is None else (hits, counts)
@@ -288,7 +296,3 @@ def _rebuild(vertices: NDArray[np.float32], faces: NDArray[np.int32], options: O
     return Scene(vertices, faces, **options)
 
 
-def _read_only(array: NDArray[Any]) -> NDArray[Any]:
-    view = array.view(np.ndarray)
-    view.flags.writeable = False
-    return view

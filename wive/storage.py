@@ -20,6 +20,7 @@ class Options(TypedDict):
     device: str | None
     accuracy: Literal["fast", "watertight", "exact"]
     nodes: Literal["float32", "compressed"]
+    quality: Literal["medium", "high"]
 
 
 def write_scene(
@@ -48,6 +49,7 @@ def read_scene(path: PathLike) -> tuple[NDArray[np.float32], NDArray[np.int32], 
             device=given.get("device"),
             accuracy=given["accuracy"],
             nodes=given["nodes"],
+            quality=given.get("quality", "medium"),
         )
     except (ValueError, TypeError, KeyError, AttributeError):
         is_scene = False
