@@ -51,8 +51,7 @@ class Scene:
             device: where backend "warp" traces, by Warp's names: "cpu", "cuda:0", ...; None is the first CUDA
                 device, else "cpu". A device alone implies backend "warp"; CPU backends take none.
             accuracy: "watertight" (rays never slip between triangles that share an edge or vertex) or "fast".
-            nodes: "float32", or "compressed": the same hits from a tree of less than two thirds the bytes;
-                slower where trees fit into the processor's caches, faster where they don't.
+            nodes: "float32", or "compressed": the same hits, under two thirds the bytes, for large trees.
 
         C-contiguous float32 vertices and int32 faces are kept, not copied: don't change them afterwards.
 
