@@ -5,13 +5,14 @@
 #include <bit>
 #include <cmath>
 #include <cstring>
+#include <utility>
 
 #include "ray.h"
 
 namespace wive {
 namespace {
 
-constexpr double highest_byte = 255;
+constexpr int highest_byte = 255;
 
 // Steps stay far from denormals, which some programs have the processor flush to zero.
 constexpr int lowest_exponent = -110;
@@ -26,14 +27,15 @@ struct Distance {
         const double a = plane, b = -static_cast<double>(origin), b_part = rounded - a;
         rest = (a - (rounded - b_part)) + (b - b_part);  // Knuth's two-sum
     }
-    // The highest multiple that is not above the plane, the lowest that is not below it.
-    double steps_below(double step) const {
-        const double steps = std::floor(rounded / step);
+    // The highest multiple that is not above the plane, the lowest that is not below it. No plane lies below the
+    // origin, and none more than a few hundred steps above it, so truncating is floor.
+    int steps_below(double step) const {
+        const int steps = static_cast<int>(rounded / step);
         return steps * step == rounded && rest < 0 ? steps - 1 : steps;
     }
-    double steps_above(double step) const {
-        const double steps = std::ceil(rounded / step);
-        return steps * step == rounded && rest > 0 ? steps + 1 : steps;
+    int steps_above(double step) const {
+        const int steps = static_cast<int>(rounded / step);
+        return steps * step < rounded || rest > 0 ? steps + 1 : steps;
     }
 };
 
@@ -49,10 +51,13 @@ float least_step(float lowest, float highest) {
 // The vertices of one block, equal where their bits are.
 class SharedVertices {
 public:
+    void add_triangle(const Mesh& mesh, std::uint32_t prim) {
+        for (int k = 0; k < 3; ++k) add(mesh.corner(prim, k));
+    }
     // How many of a triangle's corners are not among the vertices yet.
     int added_by(const Mesh& mesh, std::uint32_t prim) const {
         SharedVertices with = *this;
-        for (int k = 0; k < 3; ++k) with.add(mesh.corner(prim, k));
+        with.add_triangle(mesh, prim);
         return with.count_ - count_;
     }
     // The vertex's number; it becomes the last where it is new.
@@ -76,12 +81,12 @@ public:
 
 private:
     using Bits = std::array<std::uint32_t, 3>;
-    std::array<Bits, CompressedBlock::most_vertices + 3> vertices_;
+    std::array<Bits, 3 * block_width> vertices_;
     int count_ = 0;
 };
 
-// Hands out a leaf's triangles block by block: to each the first that is left, and then, while there is room, the one
-// that adds the fewest vertices.
+// Hands out a leaf's triangles block by block: all that are left where they fit; else the first of them, and then, while
+// there is room, the one that adds the fewest vertices.
 class LeafPacker {
 public:
     LeafPacker(const Mesh& mesh, std::span<const std::uint32_t> prims) : mesh_(mesh), count_(prims.size()) {
@@ -91,6 +96,11 @@ public:
 
     // The triangles of the next block; its vertices go into `vertices`.
     std::span<const std::uint32_t> next(SharedVertices& vertices) {
+        if (count_ <= block_width) {
+            for (std::size_t i = 0; i < count_; ++i) vertices.add_triangle(mesh_, left_[i]);
+            if (vertices.count() <= CompressedBlock::most_vertices) return {left_.data(), std::exchange(count_, 0)};
+            vertices = {};
+        }
         std::size_t taken = 0;
         while (taken < block_width && count_ > 0) {
             std::size_t best = 0;
@@ -101,7 +111,7 @@ public:
                     best = i;
                 }
             if (vertices.count() + fewest > CompressedBlock::most_vertices) break;
-            for (int k = 0; k < 3; ++k) vertices.add(mesh_.corner(left_[best], k));
+            vertices.add_triangle(mesh_, left_[best]);
             block_[taken++] = left_[best];
             std::copy(left_.begin() + best + 1, left_.begin() + count_, left_.begin() + best);
             --count_;
@@ -146,8 +156,8 @@ void CompressedWriter::write_node(const wive::Node& node, int children, Node& ou
         out.step[axis] = step;
         for (int i = 0; i < node_width; ++i) {
             const bool used = i < children;
-            const double below = used ? Distance(lowest, low[i]).steps_below(step) : highest_byte;
-            const double above = used ? Distance(lowest, high[i]).steps_above(step) : 0.0;
+            const int below = used ? Distance(lowest, low[i]).steps_below(step) : highest_byte;
+            const int above = used ? Distance(lowest, high[i]).steps_above(step) : 0;
             out.planes[2 * axis][i] = static_cast<std::uint8_t>(below);
             out.planes[2 * axis + 1][i] = static_cast<std::uint8_t>(above);
         }

@@ -1,12 +1,15 @@
-"""Compressed trees read word by word, as cpu/compressed.h describes them, and every tree's way down."""
+"""Compressed trees read word by word, as cpu/compressed.h describes them, and meshes hard for them."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from fractions import Fraction
 
 import numpy as np
+from meshes import TRIANGLE, soup, sphere
 
 from wive import _cpu
+
+Mesh = tuple[np.ndarray, np.ndarray]
 
 LEAF = 0x80000000
 NO_CHILD = 0xFFFFFFFF
@@ -93,3 +96,47 @@ def all_prims(bvh: _cpu.Bvh) -> list[int]:
     """The numbers in all leaves, sorted."""
     leaves = [reference for _, _, reference in walk(bvh) if reference >= LEAF]
     return sorted(prim for leaf in leaves for block in blocks(bvh, leaf) for prim in block.prims)
+
+
+def flat(mesh: Mesh, axis: int) -> Mesh:
+    vertices = mesh[0].copy()
+    vertices[:, axis] = 0
+    return vertices, mesh[1]
+
+
+def scaled(mesh: Mesh, scale: float) -> Mesh:
+    return (mesh[0].astype(np.float64) * scale).astype(np.float32), mesh[1]
+
+
+def strewn(count: int) -> Mesh:
+    """Triangles whose sizes and places differ by many orders of magnitude."""
+    random = np.random.default_rng(12)
+    corners = random.standard_normal((count, 1, 3)) * 10.0 ** random.uniform(-12, 6, (count, 1, 1))
+    corners = corners + random.standard_normal((count, 3, 3)) * 10.0 ** random.uniform(-9, 3, (count, 1, 1))
+    return corners.astype(np.float32).reshape(-1, 3), np.arange(3 * count, dtype=np.int32).reshape(-1, 3)
+
+
+MESHES: dict[str, Callable[[], Mesh]] = {
+    "one triangle": lambda: TRIANGLE,
+    "two triangles": lambda: soup(2, seed=1),
+    "sphere": lambda: sphere(4),
+    "soup": lambda: soup(2000, seed=2),
+    "far away": lambda: (sphere(3)[0] + np.float32([148376, 1234, -223423]), sphere(3)[1]),
+    "flat across x": lambda: flat(soup(500, seed=3), 0),
+    "flat across z": lambda: flat(soup(500, seed=4), 2),
+    "a flat triangle": lambda: (np.float32([[0, 0, 0], [1, 0, 0], [0, 1, 0]]), np.int32([[0, 1, 2]])),
+    "tiny": lambda: scaled(soup(500, seed=5), 1e-30),
+    "tinier": lambda: scaled(soup(500, seed=5), 1e-38),
+    "huge": lambda: scaled(soup(500, seed=6), 1e17),
+    "strewn": lambda: strewn(2000),
+    "all alike": lambda: (
+        np.tile(np.eye(3, dtype=np.float32), (1000, 1)),
+        np.arange(3000, dtype=np.int32).reshape(-1, 3),
+    ),
+    "signed zeros": lambda: (
+        np.float32([[0.0, 0, 0], [-0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, -1, 0]]),
+        np.int32([[0, 2, 3], [1, 4, 2]]),
+    ),
+    "all degenerate": lambda: (sphere(1)[0], np.ascontiguousarray(sphere(1)[1][:, [0, 1, 1]])),
+    "empty": lambda: (np.zeros((0, 3), np.float32), np.zeros((0, 3), np.int32)),
+}

@@ -53,8 +53,7 @@ class Scene(Refittable, CrossingQueries):
                 device, else "cpu". A device alone implies backend "warp"; CPU backends take none.
             accuracy: "watertight" (rays never slip between triangles that share an edge or vertex), "fast",
                 or "exact" (hits, their order, t and uv are those of exact arithmetic, rounded once).
-            nodes: "float32", or "compressed": the same hits from a tree of less than two thirds the bytes;
-                slower where trees fit into the processor's caches, faster where they don't.
+            nodes: "float32", or "compressed": the same hits, under two thirds the bytes, for large trees.
             quality: "medium", or "high" for a tree that takes about four times as long to build and gives
                 the same hits in fewer steps: a sixth fewer where sizes differ much, none in even meshes.
 
