@@ -143,7 +143,8 @@ class Scene(CrossingQueries):
             hits, counts = self._warp.intersect(rays, chosen, bool(stats))
         else:
             t, prim, uv, table = self._bvh.intersect(self._backend, *rays.numpy(), *work)
-            hits, counts = Hits(t, prim, uv, self._vertices, self._faces), stats_of(table, rays.library)
+            hits = Hits(t, prim, uv, self._vertices, self._faces, rays, self._options["accuracy"])
+            counts = stats_of(table, rays.library)
             if rays.library is not NUMPY:
                 hits = WrappedHits(hits, rays.library.from_numpy)
         return hits if counts is None else (hits, counts)
