@@ -53,7 +53,9 @@ def grazing() -> Set:
     corners, _ = random_triangles(random)
     slope = 10.0 ** random.uniform(-8, -3, (COUNT, 1))
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    along = corners[:, 2] - corners[:, 0] + random.standard_normal((COUNT, 1)) * (corners[:, 1] - corners[:, 0])
+    along = (
+        corners[:, 2] - corners[:, 0] + random.standard_normal((COUNT, 1)) * (corners[:, 1] - corners[:, 0])
+    )
     return aimed(corners, random, 1.5, along + slope * normal)
 
 
@@ -79,7 +81,7 @@ def directions_of_all_lengths() -> Set:
 
 
 def edges_and_vertices() -> Set:
-    """Aimed where only the rounding of corners lets many rays in; a watertight hit is then the rounded triangle's."""
+    """Aimed where only rounded corners let many rays in: what a watertight hit is then of."""
     random = np.random.default_rng(8)
     vertices, faces = sphere(4, radius=1000.0)
     vertices = (vertices + np.array([148376.0, 1234.0, -223423.0])).astype(np.float32)
@@ -162,7 +164,9 @@ def test_half_a_unit_in_the_last_place_is_no_bound_for_fast(make: Callable[[], S
 
 def test_the_error_of_the_bounds_own_arithmetic_is_needed(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(error_bounds, "ROUNDINGS", 0)
-    assert sum(broken(hits, exact, hits.error_bound) for hits, exact in (traced(make, "fast") for make in SETS))
+    assert sum(
+        broken(hits, exact, hits.error_bound) for hits, exact in (traced(make, "fast") for make in SETS)
+    )
 
 
 def test_a_well_conditioned_watertight_t_is_known_to_half_a_unit_in_the_last_place() -> None:
@@ -213,7 +217,9 @@ def test_every_backend_has_the_same_bounds(backend: str) -> None:
 
 def test_misses_have_no_bound_and_t_beyond_float32_an_infinite_one() -> None:
     scene = wive.Scene(*TRIANGLE)
-    hits = scene.intersect([[0.2, 0.2, 0], [5, 5, 0], [0.2, 0.2, -1e10]], [[0, 0, 1], [0, 0, 1], [0, 0, 1e-40]])
+    hits = scene.intersect(
+        [[0.2, 0.2, 0], [5, 5, 0], [0.2, 0.2, -1e10]], [[0, 0, 1], [0, 0, 1], [0, 0, 1e-40]]
+    )
     assert hits.mask.tolist() == [True, False, True]
     assert hits.error_bound.dtype == np.float64
     assert hits.error_bound[0] < 1e-14
@@ -223,7 +229,7 @@ def test_misses_have_no_bound_and_t_beyond_float32_an_infinite_one() -> None:
 
 def test_hits_made_by_hand_say_why_they_have_no_bound() -> None:
     hits = wive.Hits(np.zeros(1, np.float32), np.zeros(1, np.int32), np.zeros((1, 2), np.float32), *TRIANGLE)
-    with pytest.raises(ValueError, match="^error_bound needs hits that a scene returned"):
+    with pytest.raises(ValueError, match=r"^error_bound needs hits that a scene returned"):
         _ = hits.error_bound
-    with pytest.raises(ValueError, match="^spawn needs hits that a scene returned"):
+    with pytest.raises(ValueError, match=r"^spawn needs hits that a scene returned"):
         hits.spawn([0, 0, 1])

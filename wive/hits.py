@@ -75,6 +75,7 @@ class Hits:
     uv: NDArray[np.float32]
     vertices: NDArray[np.float32]
     faces: NDArray[np.int32]
+    # Only kept for what is asked later: class variables to the dataclass, which would make fields of them.
     _rays: ClassVar[Rays | None]
     _accuracy: ClassVar[str]
 
@@ -88,7 +89,7 @@ class Hits:
         rays: Rays | None = None,
         accuracy: str = "",
     ) -> None:
-        """Keep them, as a frozen dataclass would, in a third of the time; rays and accuracy are the scene's."""
+        """Keep them; as a frozen dataclass would, in a third of the time."""
         self.__dict__.update(
             t=t, prim=prim, uv=uv, vertices=vertices, faces=faces, _rays=rays, _accuracy=accuracy
         )

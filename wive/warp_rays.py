@@ -64,11 +64,14 @@ class RayLoader:
         )
 
     def directions(self, value: Any, count: int) -> Any:
-        """(count,) vec3 of directions (count,3), or (3,) for all; anything in host memory is copied here."""
+        """(count,) vec3 of directions (count,3), or (3,) for all; NumPy's are copied to the device."""
         library = library_of(value)
         if library is NUMPY:
             rows = arguments.directions(value, count)
-            return wp.array(np.ascontiguousarray(rows), dtype=wp.vec3, device=self.device, copy=False)
+            if rows.strides[0] == 0:
+                one = wp.array(rows[:1], dtype=wp.vec3, device=self.device)
+                return _vec3_view(one, count, 0)
+            return wp.array(rows, dtype=wp.vec3, device=self.device, copy=False)
         place = library.device(value)
         if place not in (self.device, None if self.device != "cpu" else self.device):
             raise ValueError(

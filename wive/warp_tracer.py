@@ -63,9 +63,7 @@ class WarpTracer:
                 hits = Hits(*found, self._vertices, self._faces, rays, self._accuracy)
                 return hits, _numpy_stats(counts)
             found = t, prim, uv
-            inner = WarpClosestHits(
-                *found, self._vertices, self._faces, self.mesh, loaded, self._accuracy
-            )
+            inner = WarpClosestHits(*found, self._vertices, self._faces, self.mesh, loaded, self._accuracy)
             return WrappedHits(inner, rays.library.from_warp), _stats(counts, rays)
 
     def occluded(self, rays: Rays, lanes: Lanes | None, stats: bool) -> tuple[Any, Stats | None]:
