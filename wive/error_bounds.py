@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 Float64 = NDArray[np.float64]
 
 UNIT_ROUNDOFF = 2.0**-53  # of double
-# A term of the residual is rounded at most ten times; two more are for the bound's own rounding.
+# A term of the residual is rounded at most nine times; three more are for the bound's own rounding.
 ROUNDINGS = 12
 BLOCK_ROWS = 1 << 15  # rows taken at once: what they need in between stays in cache
 
