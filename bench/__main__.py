@@ -5,9 +5,13 @@ import sys
 from pathlib import Path
 
 BENCHES = {
+    "build": "build time, SAH and memory against native Embree, from 100 thousand to 20 million triangles",
     "embree": "single rays against native Embree: speed, build time, SAH, memory",
+    "inflight": "speed and latency over the rays in flight, and what memory's latency allows",
     "latency": "seconds of a call over batch sizes: every backend, wp.mesh_query_ray, embreex",
-    "order": "inner nodes, leaves and triangles per ray for four orders of visiting a node's children",
+    "order": "steps per ray for five orders of visiting a node's children, and their speed",
+    "paper": "the WiVe paper's tables: path tracing with its traversals and with Embree's",
+    "python": "what a Python user sees: embreex, trimesh, Warp and wive, NumPy in and out",
 }
 
 

@@ -1,4 +1,4 @@
-"""Finds Embree's library in the embreex wheel and compiles the shim that calls it."""
+"""Compiles the benches' C++ and finds Embree's library in the embreex wheel."""
 
 import ctypes
 import hashlib
@@ -9,7 +9,7 @@ import shutil
 import subprocess
 from pathlib import Path
 
-SOURCE = Path(__file__).with_name("embree_shim.cpp")
+EMBREE_SHIM = Path(__file__).with_name("embree_shim.cpp")
 FLAGS = ["-O2", "-std=c++17", "-shared", "-fPIC"]
 
 
@@ -58,19 +58,19 @@ def compiler_version() -> str:
     return (answer.stdout.splitlines() or ["unknown"])[0]
 
 
-def compiled_shim() -> Path:
-    """Path of the compiled shim, built now if this source and compiler have not met before."""
-    key = "\n".join([SOURCE.read_text(), compiler_version(), *compiler(), *FLAGS])
-    target = cache_folder() / f"embree_shim-{hashlib.sha256(key.encode()).hexdigest()[:16]}.so"
+def compiled(source: Path) -> Path:
+    """Path of the source as a shared library, built now if it and the compiler have not met before."""
+    key = "\n".join([source.read_text(), compiler_version(), *compiler(), *FLAGS])
+    target = cache_folder() / f"{source.stem}-{hashlib.sha256(key.encode()).hexdigest()[:16]}.so"
     if not target.exists():
         draft = target.with_suffix(f".{os.getpid()}.tmp")
-        command = [*compiler(), *FLAGS, str(SOURCE), "-o", str(draft), "-ldl"]
+        command = [*compiler(), *FLAGS, str(source), "-o", str(draft), "-ldl"]
         answer = subprocess.run(command, capture_output=True, text=True, check=False)
         if answer.returncode:
             reason = next(
                 (line for line in answer.stderr.splitlines() if "error" in line), answer.stderr.strip()
             )
-            raise BenchError(f"{SOURCE.name} does not compile: {reason}")
+            raise BenchError(f"{source.name} does not compile: {reason}")
         draft.replace(target)
     return target
 
@@ -78,7 +78,7 @@ def compiled_shim() -> Path:
 def open_shim() -> ctypes.CDLL:
     """The shim, with Embree's library opened behind it."""
     library = embree_library()
-    shim = ctypes.CDLL(str(compiled_shim()))
+    shim = ctypes.CDLL(str(compiled(EMBREE_SHIM)))
     shim.shim_open.restype = ctypes.c_char_p
     problem: bytes | None = shim.shim_open(str(library).encode())
     if problem is not None:

@@ -1,9 +1,10 @@
 """Single rays against native Embree 4 on the very same arrays: speed, build time, SAH cost, memory.
 
-Ours with one thread and as many rays in flight as asked (1: plain single-ray traversal), against a loop over
-rtcIntersect1 or rtcOccluded1; fast against Embree's default, watertight against its robust flag; each kernel
-against Embree held to the same instruction set. A ratio above 1 means that wive is faster. Hits are compared,
-too: `mismatches` counts rays that only one side hits.
+Ours with one thread and as many rays in flight as asked (1: plain single-ray traversal; tuned: what a batch
+gets), against a loop over rtcIntersect1 or rtcOccluded1; float32 and compressed nodes; fast against
+Embree's default, watertight against its robust flag; each kernel against Embree held to the same
+instruction set. A ratio above 1 means that wive is faster. Hits are compared, too: `mismatches` counts rays
+that only one side hits.
 """
 
 import argparse
@@ -12,10 +13,12 @@ from collections.abc import Sequence
 from itertools import product
 
 from bench import report
+from bench.build_race import build_rows, tree_row
 from bench.compiled_shim import BenchError
 from bench.embree_figure import draw
-from bench.embree_race import Contender, build_rows, speed_rows, tree_row
-from bench.options import listed, numbers, scene_parser
+from bench.embree_race import TUNED, Contender, speed_rows
+from bench.features import NODES, node_forms
+from bench.options import in_flights, listed, scene_parser
 from bench.rays import KINDS, recorded_rays
 from bench.scenes import SceneFolder
 from bench.timing import QUICK, Effort, geometric_mean
@@ -25,15 +28,17 @@ ACCURACIES = ("fast", "watertight")
 KERNELS = ("avx512", "avx2")
 PARTS = ("speed", "build", "tree")
 BUILD_THREADS = (1, 2)
-IN_FLIGHT = (1, 32)
-RAYS = 131_072  # of each kind and scene
+IN_FLIGHT = (1, TUNED)
+RAYS = 65_536  # of each kind and scene
+EFFORT, BUILD_EFFORT = Effort(least=5, most=9), Effort(least=3, most=7)
 QUICK_RAYS = 16_384
 
 SPEED_COLUMNS = [
-    "scene", "triangles", "accuracy", "kernel", "in_flight", "rays", "count", "ratio", "low", "high",
+    "scene", "triangles", "accuracy", "kernel", "in_flight", "nodes", "rays", "count", "ratio", "low", "high",
     "wive_mrays", "embree_mrays", "rounds", "mismatches",
 ]  # fmt: skip
-MEAN_COLUMNS = ["accuracy", "kernel", "in_flight", "rays", "mean", "lowest", "lowest_scene"]
+PROGRESS = ("scene", "accuracy", "kernel", "in_flight", "nodes", "rays", "ratio")
+MEAN_COLUMNS = ["accuracy", "kernel", "in_flight", "nodes", "rays", "mean", "lowest", "lowest_scene"]
 BUILD_COLUMNS = [
     "scene", "triangles", "accuracy", "threads", "ratio", "low", "high", "wive_seconds", "embree_seconds",
     "rounds",
@@ -48,9 +53,12 @@ def main(options: Sequence[str]) -> None:
     """Runs the bench with command-line options."""
     chosen = parse_options(options)
     folder = SceneFolder(chosen.scene_dir)
-    names = folder.check(chosen.scenes)
-    contenders = [Contender(*pair) for pair in product(usable_kernels(chosen.kernels), chosen.in_flight)]
-    effort = QUICK if chosen.quick else Effort()
+    names = folder.check(chosen.scenes or [*folder.names(), folder.largest()])
+    kernels = usable_kernels(chosen.kernels)
+    forms = node_forms(chosen.nodes)
+    ways = product(kernels, chosen.in_flight, forms)
+    # Other node forms are told apart by memory, not by instruction set: the first kernel speaks for all.
+    contenders = [Contender(*way) for way in ways if way[0] == kernels[0] or way[2] == forms[0]]
     speed: list[report.Row] = []
     build: list[report.Row] = []
     trees: list[report.Row] = []
@@ -60,15 +68,19 @@ def main(options: Sequence[str]) -> None:
         if "speed" in chosen.parts:
             recorded = recorded_rays(mesh)
             sets = [recorded[kind].thinned(QUICK_RAYS if chosen.quick else RAYS) for kind in chosen.rays]
-        for accuracy in chosen.accuracy:
-            if "tree" in chosen.parts:
-                trees.append(tree_row(mesh, accuracy, contenders[0].isa))
-            if "build" in chosen.parts:
-                build += build_rows(mesh, accuracy, contenders[0].isa, BUILD_THREADS, effort)
-            if "speed" in chosen.parts:
+        # Both accuracies build the same tree.
+        accuracy = chosen.accuracy[-1]
+        if "tree" in chosen.parts:
+            trees.append(tree_row(mesh, accuracy, contenders[0].isa))
+        if "build" in chosen.parts:
+            effort = QUICK if chosen.quick else BUILD_EFFORT
+            build += build_rows(mesh, accuracy, contenders[0].isa, BUILD_THREADS, effort)
+        if "speed" in chosen.parts:
+            for accuracy in chosen.accuracy:
+                effort = QUICK if chosen.quick else EFFORT
                 for row in speed_rows(mesh, accuracy, contenders, sets, effort, chosen.ftz):
                     speed.append(row)
-                    report.print_progress(row, ("scene", "accuracy", "kernel", "in_flight", "rays", "ratio"))
+                    report.print_progress(row, PROGRESS)
 
     means = mean_rows(speed)
     report.print_table(speed, SPEED_COLUMNS, "Speed, one thread: Embree's seconds over wive's")
@@ -90,7 +102,7 @@ def main(options: Sequence[str]) -> None:
 
 def mean_rows(speed: Sequence[report.Row]) -> list[report.Row]:
     """Geometric mean and lowest ratio over scenes, per accuracy, contender and kind of rays or all kinds."""
-    keys = ("accuracy", "kernel", "in_flight")
+    keys = ("accuracy", "kernel", "in_flight", "nodes")
     rows = []
     for key in dict.fromkeys(tuple(row[name] for name in keys) for row in speed):
         group = [row for row in speed if tuple(row[name] for name in keys) == key]
@@ -132,8 +144,9 @@ def parse_options(options: Sequence[str]) -> argparse.Namespace:
         "--kernels", type=listed(), default=KERNELS, help="wive's kernels, e.g. avx512.full,avx2"
     )
     parser.add_argument(
-        "--in-flight", type=numbers, default=IN_FLIGHT, help="rays interleaved per thread, e.g. 1,32"
+        "--in-flight", type=in_flights, default=IN_FLIGHT, help="rays interleaved per thread, e.g. 1,32,tuned"
     )
+    parser.add_argument("--nodes", type=listed(NODES), default=(), help="node forms; all this build has")
     parser.add_argument("--accuracy", type=listed(ACCURACIES), default=ACCURACIES, help=", ".join(ACCURACIES))
     parser.add_argument("--rays", type=listed(KINDS), default=KINDS, help=", ".join(KINDS))
     parser.add_argument("--parts", type=listed(PARTS), default=PARTS, help=", ".join(PARTS))
@@ -153,4 +166,4 @@ def is_whole(chosen: argparse.Namespace) -> bool:
         "parts": PARTS,
     }
     complete = all(set(getattr(chosen, name)) >= set(values) for name, values in everything.items())
-    return complete and not chosen.quick and not chosen.scenes
+    return complete and not chosen.quick and not chosen.scenes and not chosen.nodes

@@ -18,7 +18,7 @@ STYLES = {"primary": ("o", "C0"), "diffuse": ("s", "C1"), "shadow": ("^", "C2"),
 def draw(speed: Sequence[Row]) -> Figure:
     """Dots right of the line at 1: wive is faster."""
     accuracies = list(dict.fromkeys(row["accuracy"] for row in speed))
-    contenders = list(dict.fromkeys((row["kernel"], row["in_flight"]) for row in speed))
+    contenders = list(dict.fromkeys(_contender(row) for row in speed))
     scenes = list(dict.fromkeys(row["scene"] for row in speed))
     figure, panels = pyplot.subplots(
         len(accuracies),
@@ -30,21 +30,23 @@ def draw(speed: Sequence[Row]) -> Figure:
         layout="constrained",
     )
     for accuracy, line in zip(accuracies, panels, strict=True):
-        for (kernel, in_flight), panel in zip(contenders, line, strict=True):
-            chosen = [
-                row
-                for row in speed
-                if (row["accuracy"], row["kernel"], row["in_flight"]) == (accuracy, kernel, in_flight)
-            ]
+        for contender, panel in zip(contenders, line, strict=True):
+            kernel, in_flight, nodes = contender
+            chosen = [row for row in speed if (row["accuracy"], _contender(row)) == (accuracy, contender)]
             _draw_panel(panel, chosen, scenes)
-            flying = "" if in_flight == 1 else f", {in_flight} rays in flight"
+            flying = {1: "", "tuned": ", in flight"}.get(in_flight, f", {in_flight} in flight")
+            compressed = "" if nodes == "float32" else f" {nodes}"
             mean = geometric_mean([row["ratio"] for row in chosen])
-            panel.set_title(f"{kernel}{flying}, {accuracy}: mean {mean:.2f}", fontsize=9)
+            panel.set_title(f"{kernel}{compressed}{flying}, {accuracy}: mean {mean:.2f}", fontsize=9)
     for panel in panels[-1]:
         panel.set_xlabel("speed relative to Embree", fontsize=9)
     handles, labels = panels[0][0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=len(labels), frameon=False, fontsize=9)
     return figure
+
+
+def _contender(row: Row) -> tuple[str, int | str, str]:
+    return row["kernel"], row["in_flight"], row["nodes"]
 
 
 def _draw_panel(panel: Axes, rows: Sequence[Row], scenes: Sequence[str]) -> None:

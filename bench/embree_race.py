@@ -1,23 +1,21 @@
-"""wive and native Embree side by side on one mesh: rows of speed, of build time, and of the trees built."""
+"""wive and native Embree side by side on one mesh: rows of speed."""
 
-import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import product
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.embree_statistics import embree_statistics
-from bench.native_embree import EmbreeMesh, Isa, flushed_denormals, trim_heap
+from bench.features import Accuracy, build_tree
+from bench.native_embree import EmbreeMesh, Isa, Quality, flushed_denormals
 from bench.rays import Rays
 from bench.report import Row
 from bench.scenes import Mesh
 from bench.timing import Comparison, Effort, compare, one_core, timed
 from wive import _cpu
 
-Accuracy = Literal["fast", "watertight"]
+TUNED = 0  # in flight: as many rays as the core chooses
 
 
 @dataclass(frozen=True)
@@ -26,6 +24,7 @@ class Contender:
 
     kernel: str
     in_flight: int = 1
+    nodes: str = "float32"
 
     @property
     def isa(self) -> Isa:
@@ -34,9 +33,12 @@ class Contender:
         return isas[self.kernel.split(".")[0]]
 
 
-def embree_tree(mesh: Mesh, accuracy: Accuracy, isa: Isa, threads: int = 1) -> EmbreeMesh:
+def embree_tree(
+    mesh: Mesh, accuracy: Accuracy, isa: Isa, threads: int = 1, quality: Quality = "medium"
+) -> EmbreeMesh:
     """Embree's counterpart to an accuracy of ours, not yet built: robust for watertight."""
-    return EmbreeMesh(mesh.vertices, mesh.faces, isa=isa, robust=accuracy == "watertight", threads=threads)
+    robust = accuracy == "watertight"
+    return EmbreeMesh(mesh.vertices, mesh.faces, isa=isa, robust=robust, threads=threads, quality=quality)
 
 
 def speed_rows(
@@ -48,24 +50,26 @@ def speed_rows(
     flush_denormals: bool,
 ) -> Iterator[Row]:
     """One row per contender and set of rays, both sides on one pinned core."""
-    ours = _cpu.Bvh(mesh.vertices, mesh.faces, accuracy)
+    forms = dict.fromkeys(contender.nodes for contender in contenders)
+    ours = {nodes: build_tree(mesh, accuracy, nodes=nodes) for nodes in forms}
     for isa in dict.fromkeys(contender.isa for contender in contenders):
         cases = list(product([one for one in contenders if one.isa == isa], sets))
         with embree_tree(mesh, accuracy, isa) as theirs:
             theirs.commit()
             for contender, rays in cases:
                 with one_core(), flushed_denormals(flush_denormals):
-                    comparison, mismatches = race(ours, theirs, contender, rays, effort)
+                    comparison, mismatches = race(ours[contender.nodes], theirs, contender, rays, effort)
                 yield {
                     "scene": mesh.name,
                     "triangles": len(mesh.faces),
                     "accuracy": accuracy,
                     "kernel": contender.kernel,
-                    "in_flight": contender.in_flight,
+                    "in_flight": contender.in_flight or "tuned",
+                    "nodes": contender.nodes,
                     "isa": isa,
                     "rays": rays.kind,
                     "count": len(rays),
-                    **_quartiles(comparison),
+                    **quartiles(comparison),
                     "wive_mrays": len(rays) / comparison.our_seconds * 1e-6,
                     "embree_mrays": len(rays) / comparison.their_seconds * 1e-6,
                     "mismatches": mismatches,
@@ -113,77 +117,8 @@ def _any_hit(ours: _cpu.Bvh, theirs: EmbreeMesh, contender: Contender, rays: Ray
     return our_run, their_run
 
 
-def build_rows(
-    mesh: Mesh, accuracy: Accuracy, isa: Isa, thread_counts: Sequence[int], effort: Effort
-) -> Iterator[Row]:
-    """Building alone, per thread count: our constructor against rtcCommitScene at its default quality."""
-    for threads in thread_counts:
-        comparison = _compare_builds(mesh, accuracy, isa, threads, effort)
-        yield {
-            "scene": mesh.name,
-            "triangles": len(mesh.faces),
-            "accuracy": accuracy,
-            "threads": threads,
-            **_quartiles(comparison),
-            "wive_seconds": comparison.our_seconds,
-            "embree_seconds": comparison.their_seconds,
-        }
-
-
-def _compare_builds(mesh: Mesh, accuracy: Accuracy, isa: Isa, threads: int, effort: Effort) -> Comparison:
-    def our_seconds() -> float:
-        trim_heap()
-        start = time.perf_counter()
-        tree = _cpu.Bvh(mesh.vertices, mesh.faces, accuracy, threads=threads)
-        seconds = time.perf_counter() - start
-        del tree  # freeing is not building
-        return seconds
-
-    def their_seconds() -> float:
-        with embree_tree(mesh, accuracy, isa, threads) as tree:
-            trim_heap()
-            return tree.commit()
-
-    our_seconds()
-    their_seconds()
-    return compare(our_seconds, their_seconds, effort)
-
-
-def tree_row(mesh: Mesh, accuracy: Accuracy, isa: Isa) -> Row:
-    """SAH cost and bytes of both trees, ours over Embree's.
-
-    The ratio of bytes is against what Embree uses; `embree_allocated` is what it holds for that.
-    """
-    ours = _cpu.Bvh(mesh.vertices, mesh.faces, accuracy)
-    inner, leaves = ours.sah
-    theirs = embree_statistics(mesh, isa=isa, robust=accuracy == "watertight")
-    with embree_tree(mesh, accuracy, isa) as tree:
-        tree.commit()
-        allocated = tree.memory / len(mesh.faces)
-    their_sah = theirs.sah_inner + theirs.sah_leaves
-    our_bytes = ours.memory / len(mesh.faces)
-    return {
-        "scene": mesh.name,
-        "triangles": len(mesh.faces),
-        "accuracy": accuracy,
-        "sah_ratio": (inner + leaves) / their_sah,
-        "wive_sah": inner + leaves,
-        "embree_sah": their_sah,
-        "wive_sah_inner": inner,
-        "embree_sah_inner": theirs.sah_inner,
-        "bytes_ratio": our_bytes / theirs.bytes_per_triangle,
-        "wive_bytes": our_bytes,
-        "embree_bytes": theirs.bytes_per_triangle,
-        "embree_allocated": allocated,
-        "wive_nodes": len(ours.nodes),
-        "embree_nodes": theirs.inner_nodes,
-        "wive_depth": ours.depth,
-        "embree_depth": theirs.depth,
-        "intersector": theirs.intersector,
-    }
-
-
-def _quartiles(comparison: Comparison) -> Row:
+def quartiles(comparison: Comparison) -> Row:
+    """The columns of a comparison."""
     return {
         "ratio": comparison.ratio,
         "low": comparison.low,

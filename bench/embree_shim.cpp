@@ -221,6 +221,13 @@ void shim_intersect(const Mesh* mesh, const Rays* rays, float* t, std::int32_t* 
     }
 }
 
+// The same for wive's renderer: ForeignTracer in cpu/render.h, the mesh as its context.
+void shim_trace(const void* mesh, std::size_t count, const float* origins, const float* directions, float tmin,
+                float tmax, float* t, std::int32_t* prim, float* uv) {
+    const Rays rays{count, origins, directions, &tmin, &tmax, 0, 0};
+    shim_intersect(static_cast<const Mesh*>(mesh), &rays, t, prim, uv);
+}
+
 void shim_occluded(const Mesh* mesh, const Rays* rays, std::uint8_t* occluded) {
     QueryContext context{invalid_id, invalid_id};
     QueryArguments arguments;

@@ -14,8 +14,9 @@ from pathlib import Path
 import numpy as np
 
 from bench.compiled_shim import BenchError
-from bench.native_embree import EmbreeMesh, Isa
+from bench.native_embree import EmbreeMesh, Isa, Quality
 from bench.scenes import Mesh
+from bench.timing import core_count
 
 
 @dataclass(frozen=True)
@@ -40,13 +41,13 @@ PATTERNS = {
 }
 
 
-def embree_statistics(mesh: Mesh, *, isa: Isa, robust: bool) -> TreeStatistics:
+def embree_statistics(mesh: Mesh, *, isa: Isa, robust: bool, quality: Quality = "medium") -> TreeStatistics:
     """Builds the mesh once in another process and reads what Embree prints."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "mesh.npz"
         np.savez(path, vertices=mesh.vertices, faces=mesh.faces)
         answer = subprocess.run(
-            [sys.executable, "-m", "bench.embree_statistics", str(path), isa, str(int(robust))],
+            [sys.executable, "-m", "bench.embree_statistics", str(path), isa, str(int(robust)), quality],
             cwd=Path(__file__).resolve().parents[1], capture_output=True, text=True, check=False,
         )  # fmt: skip
     return parse(answer.stdout, mesh.name, answer.stderr)
@@ -71,12 +72,15 @@ def parse(printed: str, name: str, complaint: str = "") -> TreeStatistics:
     )
 
 
-def _build_talking(path: str, isa: Isa, robust: bool) -> None:
+def _build_talking(path: str, isa: Isa, robust: bool, quality: Quality) -> None:
     with np.load(path) as arrays:
         vertices, faces = arrays["vertices"], arrays["faces"]
-    with EmbreeMesh(vertices, faces, isa=isa, robust=robust, verbose=2) as tree:
+    threads = core_count()
+    with EmbreeMesh(
+        vertices, faces, isa=isa, robust=robust, threads=threads, quality=quality, verbose=2
+    ) as tree:
         tree.commit()
 
 
 if __name__ == "__main__":
-    _build_talking(sys.argv[1], sys.argv[2], sys.argv[3] == "1")  # type: ignore[arg-type]
+    _build_talking(sys.argv[1], sys.argv[2], sys.argv[3] == "1", sys.argv[4])  # type: ignore[arg-type]

@@ -159,6 +159,13 @@ class EmbreeMesh:
         _shim().shim_intersect(self._mesh, rays, t.ctypes.data, prim.ctypes.data, uv.ctypes.data)
         return t, prim, uv
 
+    @property
+    def tracer(self) -> tuple[int, int]:
+        """The same closest hits for `_cpu.Bvh.render_rows`: addresses of a function and of its context."""
+        address = ctypes.cast(_shim().shim_trace, Pointer).value
+        assert address and self._mesh
+        return address, self._mesh
+
     def occluded(
         self,
         origins: NDArray[np.float32],

@@ -31,6 +31,11 @@ def numbers(text: str) -> tuple[int, ...]:
     return found
 
 
+def in_flights(text: str) -> tuple[int, ...]:
+    """Numbers of rays in flight with commas between them; "tuned" is 0, the core's own choice."""
+    return tuple(0 if part.strip() == "tuned" else numbers(part)[0] for part in text.split(","))
+
+
 def scene_parser(name: str, description: str | None) -> argparse.ArgumentParser:
     """A parser with what every bench over scenes takes."""
     summary = (description or "").split("\n")[0]

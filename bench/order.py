@@ -1,42 +1,54 @@
-"""What the order of visiting a node's children costs: inner nodes, leaves and triangles per ray, on one tree.
+"""What the order of visiting a node's children costs: steps per ray and speed, on one tree.
 
 Redoes the comparison of WiVe (Fuetterling et al., HPG 2017). `treelet` is the paper's order, from the split
-axes of the treelet behind each node and the signs of the ray; `diagonal` sorts children along the diagonal of
-the ray's octant; `none` shuffles them; `distance` sorts the children hit by their true entry
-distance, the work that the others spare. Closest hits only: for any-hit queries order matters little.
+axes of the treelet behind each node and the signs of the ray; `diagonal` sorts children along the diagonal
+of the ray's octant; `slots` is that of Ylitie, Karras and Laine (2017): each child gets one of eight places
+when the tree is built, by the assignment that suits all octants best together, and places are visited by
+their number xor the ray's octant; `none` shuffles them; `distance` sorts the children hit by their true
+entry distance, the work that the others spare. Closest hits only: for any-hit queries order matters little.
 `other_hits` counts rays whose t differs from that of the distance order (rounding at the face of a box).
+
+Speed is relative to `treelet`, in turn on one pinned core. Stored orders, `slots` among them, are followed
+by the same kernel, so their speeds differ by steps alone; one that needs no order row would also spare a
+load a node. `distance` is a kernel of its own, which sorts eight keys by a bitonic network in registers.
 """
 
 import argparse
 from collections.abc import Iterator, Sequence
 from typing import Literal
 
-import matplotlib
 import numpy as np
 from numpy.typing import NDArray
 
 from bench import report
 from bench.compiled_shim import BenchError
+from bench.embree_race import TUNED
 from bench.options import listed, scene_parser
+from bench.order_figure import draw
 from bench.rays import Rays, recorded_rays
 from bench.scenes import Mesh, SceneFolder
-from bench.timing import geometric_mean
+from bench.timing import QUICK, Effort, compare_in_turn, geometric_mean, one_core, timed
 from wive import _cpu
 
-matplotlib.use("Agg")
-from matplotlib import pyplot
-from matplotlib.figure import Figure
-
-Order = Literal["treelet", "diagonal", "none"]
-STORED_ORDERS: tuple[Order, ...] = ("treelet", "diagonal", "none")
+Order = Literal["treelet", "diagonal", "slots", "none"]
+STORED_ORDERS: tuple[Order, ...] = ("treelet", "diagonal", "slots", "none")
 DISTANCE = "distance"
 COUNTING_KERNEL = "scalar"
 DISTANCE_KERNEL = "scalar.distance"
+# Kernel of the stored orders and that of true distance, the best pair that runs here.
+TIMED_KERNELS = (("avx512.full", "avx512.distance"), (COUNTING_KERNEL, DISTANCE_KERNEL))
+TIMED_RAYS = 131_072
+IN_FLIGHT = (1, TUNED)
 KINDS = ("primary", "diffuse")
 COUNTERS = ("inner_nodes", "leaves", "triangles")
 RELATIVE = ("nodes_vs_distance", "triangles_vs_distance")
+SPEED_COLUMNS = [
+    "scene", "faces", "rays", "count", "in_flight", "order", "kernel", "speed", "low", "high", "mrays",
+    "rounds",
+]  # fmt: skip
 COLUMNS = ["scene", "faces", "rays", "count", "order", *COUNTERS, *RELATIVE, "other_hits"]
 QUICK_RAYS = 16_384
+Trees = dict[Order, _cpu.Bvh]
 
 
 def main(options: Sequence[str]) -> None:
@@ -45,27 +57,33 @@ def main(options: Sequence[str]) -> None:
     folder = SceneFolder(chosen.scene_dir)
     names = folder.check(chosen.scenes)
     rows: list[report.Row] = []
+    speed: list[report.Row] = []
     for name in names:
         mesh = folder.load(name)
+        trees = {order: _cpu.Bvh(mesh.vertices, mesh.faces, "fast", order) for order in STORED_ORDERS}
+        check_same_tree(list(trees.values()), mesh.name)
         recorded = recorded_rays(mesh)
         sets = [
             recorded[kind].thinned(QUICK_RAYS) if chosen.quick else recorded[kind] for kind in chosen.rays
         ]
-        rows += scene_rows(mesh, sets)
+        rows += scene_rows(mesh, trees, sets)
+        speed += speed_rows(mesh, trees, sets, QUICK if chosen.quick else Effort())
         print(f"{name}: done", flush=True)
-    means = mean_rows(rows)
+    means = mean_rows(rows, ("rays", "order"), RELATIVE)
+    speed_means = mean_rows(speed, ("rays", "in_flight", "order"), ("speed",))
     report.print_table(
         rows, COLUMNS, "Per ray, on one tree; relative columns: 1 is as good as true distance order"
     )
     report.print_table(means, ["rays", "order", *RELATIVE], "Geometric means")
+    report.print_table(speed, SPEED_COLUMNS, "Speed, relative to the treelet order")
+    report.print_table(speed_means, ["rays", "in_flight", "order", "speed"], "Geometric means")
     whole = not chosen.quick and not chosen.scenes and set(chosen.rays) == set(KINDS)
-    report.save("order", {"rows": rows, "means": means}, draw(rows), chosen.out, whole=whole)
+    content = {"rows": rows, "means": means, "speed": speed, "speed_means": speed_means}
+    report.save("order", content, draw(rows, speed), chosen.out, whole=whole)
 
 
-def scene_rows(mesh: Mesh, sets: Sequence[Rays]) -> Iterator[report.Row]:
-    """One row per set of rays and order."""
-    trees = {order: _cpu.Bvh(mesh.vertices, mesh.faces, "fast", order) for order in STORED_ORDERS}
-    check_same_tree(list(trees.values()), mesh.name)
+def scene_rows(mesh: Mesh, trees: Trees, sets: Sequence[Rays]) -> Iterator[report.Row]:
+    """Steps: one row per set of rays and order."""
     walks = {DISTANCE: (trees["treelet"], DISTANCE_KERNEL)}
     walks |= {order: (tree, COUNTING_KERNEL) for order, tree in trees.items()}
     for rays in sets:
@@ -83,6 +101,40 @@ def scene_rows(mesh: Mesh, sets: Sequence[Rays]) -> Iterator[report.Row]:
                 "triangles_vs_distance": counters["triangles"] / nearest["triangles"],
                 "other_hits": int(np.count_nonzero(t != nearest_t)),
             }
+
+
+def speed_rows(mesh: Mesh, trees: Trees, sets: Sequence[Rays], effort: Effort) -> Iterator[report.Row]:
+    """Speed: one row per set of rays, number in flight and order."""
+    unusable = _cpu.kernels()
+    stored, sorting = next(pair for pair in TIMED_KERNELS if not any(unusable[kernel] for kernel in pair))
+    walks: dict[str, tuple[_cpu.Bvh, str]] = {order: (tree, stored) for order, tree in trees.items()}
+    walks[DISTANCE] = (trees["treelet"], sorting)
+    for rays in (rays.thinned(TIMED_RAYS) for rays in sets):
+        for in_flight in IN_FLIGHT:
+
+            def trace(walk: tuple[_cpu.Bvh, str], rays: Rays = rays, in_flight: int = in_flight) -> None:
+                walk[0].intersect(walk[1], *rays.arrays, threads=1, in_flight=in_flight)
+
+            runs = [timed(lambda walk=walk: trace(walk)) for walk in walks.values()]  # type: ignore[misc]
+            with one_core():
+                for run in runs:
+                    run()
+                outcomes = compare_in_turn(runs, effort)
+            for (order, (_, kernel)), outcome in zip(walks.items(), outcomes, strict=True):
+                yield {
+                    "scene": mesh.name,
+                    "faces": len(mesh.faces),
+                    "rays": rays.kind,
+                    "count": len(rays),
+                    "in_flight": in_flight or "tuned",
+                    "order": order,
+                    "kernel": kernel,
+                    "speed": outcome.ratio,
+                    "low": outcome.low,
+                    "high": outcome.high,
+                    "mrays": len(rays) / outcome.our_seconds * 1e-6,
+                    "rounds": outcome.rounds,
+                }
 
 
 def _trace(tree: _cpu.Bvh, kernel: str, rays: Rays) -> tuple[NDArray[np.float32], dict[str, float]]:
@@ -104,51 +156,14 @@ def check_same_tree(trees: Sequence[_cpu.Bvh], name: str) -> None:
             raise BenchError(f"trees of {name} differ in more than their order")
 
 
-def mean_rows(rows: Sequence[report.Row]) -> list[report.Row]:
-    """Geometric means over scenes of the columns relative to the distance order."""
+def mean_rows(rows: Sequence[report.Row], keys: Sequence[str], columns: Sequence[str]) -> list[report.Row]:
+    """Geometric means of some columns over scenes, per combination of the keys."""
     means: list[report.Row] = []
-    for kind, order in dict.fromkeys((row["rays"], row["order"]) for row in rows):
-        group = [row for row in rows if (row["rays"], row["order"]) == (kind, order)]
-        values = {column: geometric_mean([row[column] for row in group]) for column in RELATIVE}
-        means.append({"rays": kind, "order": order, **values})
+    for key in dict.fromkeys(tuple(row[name] for name in keys) for row in rows):
+        group = [row for row in rows if tuple(row[name] for name in keys) == key]
+        values = {column: geometric_mean([row[column] for row in group]) for column in columns}
+        means.append({**dict(zip(keys, key, strict=True)), **values})
     return means
-
-
-def draw(rows: Sequence[report.Row]) -> Figure:
-    """Inner nodes per ray relative to the distance order: a panel per kind of rays, bars per scene."""
-    kinds = list(dict.fromkeys(row["rays"] for row in rows))
-    scenes = list(dict.fromkeys(row["scene"] for row in rows))
-    figure, panels = pyplot.subplots(
-        1,
-        len(kinds),
-        figsize=(2.4 + 3.6 * len(kinds), 1.3 + 0.5 * len(scenes)),
-        sharex=True,
-        sharey=True,
-        squeeze=False,
-        layout="constrained",
-    )
-    height = 0.8 / len(STORED_ORDERS)
-    for kind, panel in zip(kinds, panels[0], strict=True):
-        for i, order in enumerate(STORED_ORDERS):
-            chosen = {
-                row["scene"]: row["nodes_vs_distance"]
-                for row in rows
-                if (row["rays"], row["order"]) == (kind, order)
-            }
-            positions = [scenes.index(scene) + (i - 1) * height for scene in chosen]
-            bars = panel.barh(positions, list(chosen.values()), height * 0.9, label=order, color=f"C{i}")
-            panel.bar_label(bars, fmt="%.2f", fontsize=7, padding=2)
-        panel.axvline(1.0, color="0.4", linewidth=1)
-        panel.set_title(f"{kind} rays", fontsize=10)
-        panel.set_xlabel("inner nodes per ray, relative to distance order", fontsize=9)
-        panel.set_yticks(range(len(scenes)), scenes, fontsize=8)
-        panel.set_ylim(len(scenes) - 0.5, -0.5)
-        panel.margins(x=0.12)
-        panel.tick_params(length=0, labelsize=8)
-        panel.spines[["top", "right", "left"]].set_visible(False)
-    handles, labels = panels[0][0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=len(labels), frameon=False, fontsize=9)
-    return figure
 
 
 def parse_options(options: Sequence[str]) -> argparse.Namespace:

@@ -5,7 +5,7 @@ On a shared machine absolute speed drifts; two neighbours in time see the same m
 
 import os
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 
@@ -23,6 +23,19 @@ class Comparison:
     their_seconds: float
     rounds: int
 
+    @property
+    def uncertainty(self) -> float:
+        """Of the ratio, relative: a median of n varies by about the interquartile range over sqrt(n)."""
+        return float((self.high - self.low) / self.ratio / self.rounds**0.5)
+
+    @classmethod
+    def of(cls, our_seconds: Sequence[float], their_seconds: Sequence[float]) -> "Comparison":
+        """Of seconds taken in turn, round by round."""
+        ratios = np.divide(their_seconds, our_seconds)
+        low, ratio, high = (float(q) for q in np.quantile(ratios, (0.25, 0.5, 0.75)))
+        medians = (float(np.median(our_seconds)), float(np.median(their_seconds)))
+        return cls(ratio, low, high, *medians, len(ratios))
+
 
 @dataclass(frozen=True)
 class Effort:
@@ -34,6 +47,11 @@ class Effort:
 
 
 QUICK = Effort(least=2, most=2)
+
+
+def core_count() -> int:
+    """Cores that this process may run on."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 @contextmanager
@@ -64,22 +82,32 @@ def timed(work: Callable[[], object]) -> Callable[[], float]:
     return run
 
 
+def wall_timed(work: Callable[[], object]) -> Callable[[], float]:
+    """The same work as a function that returns its wall-clock seconds: for work on several threads."""
+
+    def run() -> float:
+        start = time.perf_counter()
+        work()
+        return time.perf_counter() - start
+
+    return run
+
+
 def compare(ours: Callable[[], float], theirs: Callable[[], float], effort: Effort) -> Comparison:
     """Runs both in turn, each returning its seconds, until the ratio holds. Warming up is the caller's."""
-    our_seconds: list[float] = []
-    their_seconds: list[float] = []
+    return compare_in_turn([theirs, ours], effort)[1]
+
+
+def compare_in_turn(runs: Sequence[Callable[[], float]], effort: Effort) -> list[Comparison]:
+    """Runs all in turn until every ratio holds: how much faster each is than the first."""
+    seconds: list[list[float]] = [[] for _ in runs]
     while True:
-        our_seconds.append(ours())
-        their_seconds.append(theirs())
-        rounds = len(our_seconds)
-        ratios = np.divide(their_seconds, our_seconds)
-        low, ratio, high = (float(q) for q in np.quantile(ratios, (0.25, 0.5, 0.75)))
-        # The median of n samples is uncertain by about their interquartile range over sqrt(n).
-        uncertainty = (high - low) / ratio / rounds**0.5
-        if rounds >= effort.least and (uncertainty < effort.precision or rounds >= effort.most):
-            break
-    medians = (float(np.median(our_seconds)), float(np.median(their_seconds)))
-    return Comparison(ratio, low, high, *medians, rounds)
+        for run, taken in zip(runs, seconds, strict=True):
+            taken.append(run())
+        outcomes = [Comparison.of(taken, seconds[0]) for taken in seconds]
+        rounds, doubt = len(seconds[0]), max(outcome.uncertainty for outcome in outcomes)
+        if rounds >= effort.least and (doubt < effort.precision or rounds >= effort.most):
+            return outcomes
 
 
 def geometric_mean(ratios: list[float]) -> float:

@@ -22,11 +22,12 @@ struct Halves {
 
 class TreeBuilder {
 public:
-    TreeBuilder(BinaryTree& tree, unsigned threads, int depth_limit)
+    TreeBuilder(BinaryTree& tree, unsigned threads, int depth_limit, std::uint32_t largest_leaf)
         : tree_(tree),
           scratch_(tree.count > parallel_range ? tree.count : 0),
           threads_(threads),
-          depth_limit_(depth_limit) {}
+          depth_limit_(depth_limit),
+          largest_leaf_(largest_leaf) {}
 
     void build() {
         struct Item {
@@ -66,7 +67,8 @@ public:
             BinaryNode& node = tree_.nodes[item.split];
             node.left = items[item.left].split;
             node.right = items[item.left + 1].split;
-            item.costs = gather_costs(node, item.range.box, items[item.left].costs, items[item.left + 1].costs);
+            item.costs = gather_costs(node, item.range.box, items[item.left].costs, items[item.left + 1].costs,
+                                      largest_leaf_);
         }
         tree_.root = items[0].split;
         tree_.box = items[0].range.box;
@@ -121,7 +123,7 @@ private:
         BinaryNode& node = tree_.nodes[split];
         node.left = left_split;
         node.right = right_split;
-        return gather_costs(node, range.box, left, right);
+        return gather_costs(node, range.box, left, right, largest_leaf_);
     }
 
     static Halves start_halves(const Range& range, std::uint32_t middle, int axis) {
@@ -235,16 +237,18 @@ private:
     LargeArray<PrimRef> scratch_;
     unsigned threads_;
     int depth_limit_;
+    std::uint32_t largest_leaf_;
 };
 
 }  // namespace
 
-BinaryTree build_binary_tree(LargeArray<PrimRef> refs, std::uint32_t count, unsigned threads, int depth_limit) {
+BinaryTree build_binary_tree(LargeArray<PrimRef> refs, std::uint32_t count, unsigned threads, int depth_limit,
+                             std::uint32_t largest_leaf) {
     BinaryTree tree;
     tree.refs = std::move(refs);
     tree.count = count;
     tree.nodes = LargeArray<BinaryNode>(count);
-    if (count > 0) TreeBuilder(tree, threads, depth_limit).build();
+    if (count > 0) TreeBuilder(tree, threads, depth_limit, largest_leaf).build();
     return tree;
 }
 

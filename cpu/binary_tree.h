@@ -41,7 +41,9 @@ struct BinaryTree {
 };
 
 // Binned SAH, leaf cost counted in blocks of four. The same tree whatever the number of threads. At most depth_limit
-// levels deep: where the rest could be too deep, ranges are halved by number, which bit_width(blocks) levels finish.
-BinaryTree build_binary_tree(LargeArray<PrimRef> refs, std::uint32_t count, unsigned threads, int depth_limit);
+// levels deep: where the rest could be too deep, ranges are halved by number, which bit_width(blocks) levels finish. Leaves of
+// at most largest_leaf blocks of four triangles.
+BinaryTree build_binary_tree(LargeArray<PrimRef> refs, std::uint32_t count, unsigned threads, int depth_limit,
+                             std::uint32_t largest_leaf);
 
 }  // namespace wive

@@ -5,8 +5,10 @@
 
 #include <memory>
 #include <optional>
+#include <span>
 #include <stdexcept>
 #include <string>
+#include <utility>
 
 #include "builder.h"
 #include "dispatch.h"
@@ -49,10 +51,17 @@ const char* accuracy_name(Accuracy accuracy) {
     return accuracy == Accuracy::fast ? "fast" : accuracy == Accuracy::watertight ? "watertight" : "exact";
 }
 
+NodeForm parse_nodes(const std::string& name) {
+    if (name == "float32") return NodeForm::float32;
+    expect(name == "compressed", "nodes: expected 'float32' or 'compressed'");
+    return NodeForm::compressed;
+}
+
 ChildOrder parse_order(const std::string& name) {
     if (name == "treelet") return ChildOrder::treelet;
     if (name == "diagonal") return ChildOrder::diagonal;
-    expect(name == "none", "order: expected 'treelet', 'diagonal' or 'none'");
+    if (name == "slots") return ChildOrder::slots;
+    expect(name == "none", "order: expected 'treelet', 'diagonal', 'slots' or 'none'");
     return ChildOrder::none;
 }
 
@@ -60,12 +69,12 @@ ChildOrder parse_order(const std::string& name) {
 class PyBvh {
 public:
     PyBvh(Array<float> vertices, Array<std::int32_t> faces, const std::string& accuracy, const std::string& order,
-          unsigned threads, int depth_limit)
+          unsigned threads, int depth_limit, const std::string& nodes)
         : vertices_(std::move(vertices)), faces_(std::move(faces)) {
         expect_shape(vertices_, 3, "vertices: expected shape (v, 3)");
         expect_shape(faces_, 3, "faces: expected shape (f, 3)");
         expect(depth_limit >= 1 && depth_limit <= max_depth, "depth_limit: expected 1 to 64");
-        const BuildOptions options = {parse_accuracy(accuracy), parse_order(order), threads, depth_limit};
+        const BuildOptions options = {parse_accuracy(accuracy), parse_nodes(nodes), parse_order(order), threads, depth_limit};
         const Mesh view = mesh();
         py::gil_scoped_release release;
         bvh_ = std::make_unique<Bvh>(view, options);
@@ -105,7 +114,7 @@ Rays ray_batch(const Array<float>& origins, const Array<float>& directions, cons
 void trace_released(const PyBvh& self, const std::string& kernel, QueryKind query, const Rays& rays,
                     const HitBatch& hits, unsigned threads, unsigned in_flight) {
     const KernelTable& table = find_kernels(kernel);
-    const TraceBatch batch = table.find({query, self.bvh().accuracy(), hits.stats != nullptr});
+    const TraceBatch batch = table.find({query, self.bvh().accuracy(), self.bvh().node_form(), hits.stats != nullptr});
     const BvhView bvh = self.bvh().view();
     py::gil_scoped_release release;
     trace(table, batch, bvh, rays.batch, hits, rays.count, threads, in_flight);
@@ -165,7 +174,7 @@ py::tuple intersect_all(const PyBvh& self, const std::string& kernel, const Arra
     std::optional<Array<std::int32_t>> steps;
     std::int32_t* steps_data = stats ? steps.emplace(std::vector<py::ssize_t>{n, 3}).mutable_data() : nullptr;
     const KernelTable& table = find_kernels(kernel);
-    const TraceBatch batch = table.find({QueryKind::all, self.bvh().accuracy(), stats});
+    const TraceBatch batch = table.find({QueryKind::all, self.bvh().accuracy(), self.bvh().node_form(), stats});
     const BvhView bvh = self.bvh().view();
     std::int64_t* offsets_data = offsets.mutable_data();
     std::optional<Gathering> gathering;
@@ -186,9 +195,16 @@ py::tuple intersect_all(const PyBvh& self, const std::string& kernel, const Arra
     return py::make_tuple(std::move(offsets), std::move(t), std::move(prim), std::move(uv), std::move(steps));
 }
 
+// Function and context as ctypes gives their addresses.
+ForeignTracer foreign_tracer(const std::optional<std::pair<std::uintptr_t, std::uintptr_t>>& addresses) {
+    if (!addresses) return {};
+    return {reinterpret_cast<ForeignTracer::Function>(addresses->first), reinterpret_cast<const void*>(addresses->second)};
+}
+
 std::uint64_t render(const PyBvh& self, const std::string& kernel, const Array<float>& camera, Array<float> image,
                      int row_begin, int row_end, int samples, int bounces, const std::string& albedo, std::uint32_t seed,
-                     unsigned threads) {
+                     unsigned threads, unsigned in_flight,
+                     std::optional<std::pair<std::uintptr_t, std::uintptr_t>> tracer) {
     expect(camera.ndim() == 2 && camera.shape(0) == 4 && camera.shape(1) == 3, "camera: expected shape (4, 3)");
     expect(image.ndim() == 3 && image.shape(2) == 3, "image: expected shape (height, width, 3)");
     expect(0 <= row_begin && row_begin <= row_end && row_end <= image.shape(0), "rows: expected a range within the image");
@@ -199,6 +215,7 @@ std::uint64_t render(const PyBvh& self, const std::string& kernel, const Array<f
                            self.mesh(),
                            find_kernels(kernel),
                            self.bvh().accuracy(),
+                           self.bvh().node_form(),
                            {row(0), row(1), row(2), row(3)},
                            static_cast<int>(image.shape(1)),
                            static_cast<int>(image.shape(0)),
@@ -206,7 +223,9 @@ std::uint64_t render(const PyBvh& self, const std::string& kernel, const Array<f
                            bounces,
                            albedo == "normals" ? Albedo::normals : Albedo::gray,
                            seed,
-                           image.mutable_data()};
+                           image.mutable_data(),
+                           in_flight,
+                           foreign_tracer(tracer)};
     py::gil_scoped_release release;
     check_mesh(job.mesh, thread_count(threads));  // its arrays are the caller's, who may have changed them since
     return render_rows(job, row_begin, row_end, thread_count(threads));
@@ -218,6 +237,14 @@ py::array_t<T> view(py::handle owner, std::vector<py::ssize_t> shape, const T* d
     py::array_t<T> array(std::move(shape), data, owner);
     array.attr("setflags")(py::arg("write") = false);
     return array;
+}
+
+// Nodes or blocks as words, in rows of so many.
+py::array_t<std::uint32_t> rows(py::handle owner, std::span<const std::byte> data, std::size_t each, std::size_t columns) {
+    return view(owner,
+                {static_cast<py::ssize_t>(data.size() / each), static_cast<py::ssize_t>(each / 4 / columns),
+                 static_cast<py::ssize_t>(columns)},
+                reinterpret_cast<const std::uint32_t*>(data.data()));
 }
 
 template <std::size_t n>
@@ -239,18 +266,18 @@ PYBIND11_MODULE(_cpu, m, py::mod_gil_not_used()) {
     });
     const auto array = [](const char* name) { return py::arg(name).noconvert(); };
     py::class_<PyBvh>(m, "Bvh")
-        .def(py::init<Array<float>, Array<std::int32_t>, const std::string&, const std::string&, unsigned, int>(),
+        .def(py::init<Array<float>, Array<std::int32_t>, const std::string&, const std::string&, unsigned, int,
+                      const std::string&>(),
              array("vertices"), array("faces"), py::arg("accuracy") = "watertight", py::arg("order") = "treelet",
-             py::arg("threads") = 0, py::arg("depth_limit") = max_depth)
+             py::arg("threads") = 0, py::arg("depth_limit") = max_depth, py::arg("nodes") = "float32")
         .def_property_readonly("nodes", [](py::object self) {
-            const auto nodes = self.cast<const PyBvh&>().bvh().nodes();
-            return view(self, {static_cast<py::ssize_t>(nodes.size()), 8, 8},
-                        reinterpret_cast<const std::uint32_t*>(nodes.data()));
+            const Bvh& bvh = self.cast<const PyBvh&>().bvh();
+            return rows(self, bvh.nodes(), bvh.node_bytes(), 8);
         })
         .def_property_readonly("blocks", [](py::object self) {
-            const auto blocks = self.cast<const PyBvh&>().bvh().blocks();
-            return view(self, {static_cast<py::ssize_t>(blocks.size()), 10, 4},
-                        reinterpret_cast<const std::uint32_t*>(blocks.data()));
+            const Bvh& bvh = self.cast<const PyBvh&>().bvh();
+            if (bvh.node_form() == NodeForm::compressed) return rows(self, bvh.blocks(), unit_bytes, 8);
+            return rows(self, bvh.blocks(), sizeof(TriangleBlock), 4);
         })
         .def_property_readonly("units", [](py::object self) {
             const Bvh& bvh = self.cast<const PyBvh&>().bvh();
@@ -271,6 +298,9 @@ PYBIND11_MODULE(_cpu, m, py::mod_gil_not_used()) {
         .def_property_readonly("accuracy", [](const PyBvh& self) {
             return accuracy_name(self.bvh().accuracy());
         })
+        .def_property_readonly("node_form", [](const PyBvh& self) {
+            return self.bvh().node_form() == NodeForm::float32 ? "float32" : "compressed";
+        })
         .def_property_readonly("depth", [](const PyBvh& self) { return self.bvh().depth(); })
         .def_property_readonly("memory", [](const PyBvh& self) {
             return self.bvh().bytes();
@@ -289,5 +319,5 @@ PYBIND11_MODULE(_cpu, m, py::mod_gil_not_used()) {
              array("tmax"), py::arg("threads") = 0, py::arg("in_flight") = 0, py::arg("stats") = false)
         .def("render_rows", &render, py::arg("kernel"), array("camera"), array("image"), py::arg("row_begin"),
              py::arg("row_end"), py::arg("samples"), py::arg("bounces"), py::arg("albedo"), py::arg("seed") = 0,
-             py::arg("threads") = 0);
+             py::arg("threads") = 0, py::arg("in_flight") = 0, py::arg("tracer") = py::none());
 }

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <span>
 
+#include "compressed.h"
 #include "large_array.h"
 #include "layout.h"
 #include "mesh.h"
@@ -14,6 +15,7 @@ namespace wive {
 
 struct BuildOptions {
     Accuracy accuracy = Accuracy::watertight;
+    NodeForm nodes = NodeForm::float32;
     ChildOrder order = ChildOrder::treelet;
     unsigned threads = 0;  // 0: every core
     int depth_limit = max_depth;
@@ -26,11 +28,12 @@ public:
 
     BvhView view() const;
     std::size_t bytes() const { return units_.size(); }
-    std::span<const Node> nodes() const { return {reinterpret_cast<const Node*>(units_.data()), node_count_}; }
-    std::span<const TriangleBlock> blocks() const {
-        return {reinterpret_cast<const TriangleBlock*>(units_.data() + node_count_ * sizeof(Node)), block_count_};
-    }
+    // As they are stored; float32 blocks have one size, compressed ones two.
+    std::span<const std::byte> nodes() const { return {units_.data(), node_count_ * node_bytes()}; }
+    std::span<const std::byte> blocks() const { return {units_.data() + nodes().size(), bytes() - nodes().size()}; }
+    std::size_t node_bytes() const { return form_ == NodeForm::float32 ? sizeof(Node) : sizeof(CompressedNode); }
     Accuracy accuracy() const { return accuracy_; }
+    NodeForm node_form() const { return form_; }
     int depth() const { return depth_; }
     std::array<std::array<float, 3>, 2> bounds() const { return bounds_; }
 
@@ -41,9 +44,13 @@ public:
     Sah sah() const;
 
 private:
+    template <class StoredNode>
+    Sah sah_of(double root) const;
+
     LargeArray<std::byte> units_;
-    std::size_t node_count_ = 0, block_count_ = 0;
+    std::size_t node_count_ = 0;
     Accuracy accuracy_;
+    NodeForm form_;
     int depth_ = 0;
     std::array<float, 3> center_{}, extent_{};
     std::array<std::array<float, 3>, 2> bounds_{};

@@ -34,7 +34,8 @@ SlotSequences add_slots(const BinaryTree& tree, Treelet& treelet, std::uint32_t 
 
 }  // namespace
 
-SlotCosts gather_costs(BinaryNode& node, const Box& box, const SlotCosts& left, const SlotCosts& right) {
+SlotCosts gather_costs(BinaryNode& node, const Box& box, const SlotCosts& left, const SlotCosts& right,
+                       std::uint32_t largest_leaf) {
     const float area = box.half_area();
     SlotCosts costs;
     costs[0] = std::numeric_limits<float>::infinity();
@@ -57,7 +58,7 @@ SlotCosts gather_costs(BinaryNode& node, const Box& box, const SlotCosts& left, 
     const float leaf = area * block_cost * static_cast<float>(blocks);
     const float wide = area * node_cost + shared[node_width];
     // The limit is asked apart from the costs, which are infinite both where coordinates are very large.
-    const bool as_one = blocks <= max_leaf_blocks && leaf <= wide;
+    const bool as_one = blocks <= largest_leaf && leaf <= wide;
     node.share[1] = as_one ? as_leaf : as_wide_node;
     costs[1] = as_one ? leaf : wide;
     for (std::size_t i = 2; i <= node_width; ++i) {

@@ -22,8 +22,9 @@ inline SlotCosts block_costs(const Box& box) {
     return costs;
 }
 
-// Fills in node.share and returns the node's costs.
-SlotCosts gather_costs(BinaryNode& node, const Box& box, const SlotCosts& left, const SlotCosts& right);
+// Fills in node.share and returns the node's costs. largest_leaf: in blocks of four.
+SlotCosts gather_costs(BinaryNode& node, const Box& box, const SlotCosts& left, const SlotCosts& right,
+                       std::uint32_t largest_leaf);
 
 // A wide node's child: the references [begin, end), as a leaf or, at its binary split position, as a wide node.
 struct Slot {

@@ -41,6 +41,7 @@ const std::vector<Entry>& entries() {
         {"avx512", avx512_full_kernels(), has_avx512(), avx512},
         {"avx512.full", avx512_full_kernels(), has_avx512(), avx512},
         {"avx512.half", avx512_half_kernels(), has_avx512(), avx512},
+        {"avx512.distance", avx512_by_distance_kernels(), has_avx512(), avx512},
         {"avx2", avx2_kernels(), has_avx2(), avx2},
         {"scalar", scalar_kernels(), true, ""},
         {"scalar.distance", scalar_by_distance_kernels(), true, ""},

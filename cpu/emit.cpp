@@ -3,12 +3,15 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <span>
 #include <stdexcept>
 #include <utility>
 #include <vector>
 
 #include "collapse.h"
 #include "parallel.h"
+#include "write_compressed.h"
+#include "write_float32.h"
 
 namespace wive {
 
@@ -25,13 +28,31 @@ namespace {
 
 constexpr std::uint32_t parallel_subtree = 1 << 14;  // subtrees of at most so many triangles are emitted by one thread
 
+// A leaf's triangles by rising number.
+class LeafPrims {
+public:
+    LeafPrims(const BinaryTree& tree, const Slot& slot) : count_(slot.end - slot.begin) {
+        for (std::uint32_t i = 0; i < count_; ++i) prims_[i] = tree.refs[slot.begin + i].prim();
+        std::sort(prims_.begin(), prims_.begin() + count_);
+    }
+    std::span<const std::uint32_t> span() const { return {prims_.data(), count_}; }
+
+private:
+    std::array<std::uint32_t, block_width * max_leaf_blocks> prims_;
+    std::uint32_t count_;
+};
+
+// Plans where everything goes; Writer knows what the nodes and blocks there look like.
+template <class Writer>
 class Emitter {
+    using StoredNode = typename Writer::Node;
+
 public:
     Emitter(const BinaryTree& tree, const Mesh& mesh, const BuildOptions& options, const std::array<float, 3>& center)
         : tree_(tree), mesh_(mesh), options_(options), center_(center) {}
 
     struct Size {
-        std::size_t nodes = 0, blocks = 0;
+        std::size_t nodes = 0, leaf_units = 0;
     };
 
     EmittedTree emit(unsigned threads) {
@@ -45,27 +66,25 @@ public:
         for (Subtree& subtree : subtrees) {
             subtree.first = total;
             total.nodes += subtree.size.nodes;
-            total.blocks += subtree.size.blocks;
+            total.leaf_units += subtree.size.leaf_units;
         }
-        const std::size_t node_bytes = total.nodes * sizeof(Node), bytes = node_bytes + total.blocks * sizeof(TriangleBlock);
+        const std::size_t node_bytes = total.nodes * sizeof(StoredNode);
+        const std::size_t bytes = node_bytes + total.leaf_units * unit_bytes;
         if (bytes / unit_bytes > max_units) throw std::invalid_argument("faces: too many triangles for one scene");
         LargeArray<std::byte> units(bytes);
-        nodes_ = reinterpret_cast<Node*>(units.data());
-        blocks_ = reinterpret_cast<TriangleBlock*>(units.data() + node_bytes);
-        first_block_unit_ = node_bytes / unit_bytes;
+        nodes_ = reinterpret_cast<StoredNode*>(units.data());
+        leaves_ = units.data() + node_bytes;
+        first_leaf_unit_ = node_bytes / unit_bytes;
         Size cursor = {1, 0};
         std::size_t next_subtree = 0;
         int depth = emit_top(root, 0, cursor, subtrees, next_subtree);
         std::vector<int> depths(subtrees.size());
         parallel_for(subtrees.size(), threads, [&](std::size_t i) {
             Size at = subtrees[i].first;
-            if (subtrees[i].slot.leaf)
-                write_leaf(subtrees[i].slot, at);
-            else
-                depths[i] = emit_subtree(subtrees[i].slot, subtrees[i].node, at);
+            if (!subtrees[i].slot.leaf) depths[i] = emit_subtree(subtrees[i].slot, subtrees[i].node, at);
         });
         for (std::size_t i = 0; i < subtrees.size(); ++i) depth = std::max(depth, subtrees[i].depth + depths[i]);
-        return {std::move(units), total.nodes, total.blocks, depth};
+        return {std::move(units), total.nodes, depth};
     }
 
 private:
@@ -78,11 +97,7 @@ private:
     };
     using Children = std::array<std::uint32_t, node_width>;
 
-    static std::uint32_t node_child(std::size_t node) { return inner_child(node * (sizeof(Node) / unit_bytes)); }
-    std::uint32_t block_child(std::size_t first, std::size_t count) const {
-        return leaf_child(first_block_unit_ + first * (sizeof(TriangleBlock) / unit_bytes),
-                          static_cast<std::uint32_t>(count));
-    }
+    static std::uint32_t node_child(std::size_t node) { return inner_child(node * (sizeof(StoredNode) / unit_bytes)); }
 
     static bool is_top(const Slot& slot) { return !slot.leaf && slot.end - slot.begin > parallel_subtree; }
 
@@ -97,16 +112,16 @@ private:
         }
     }
 
-    // Nodes and blocks below a slot, without the slot's own node.
+    // Nodes and units of blocks below a slot, without the slot's own node.
     Size measure(const Slot& slot) const {
-        if (slot.leaf) return {0, blocks_for(slot.end - slot.begin)};
+        if (slot.leaf) return {0, Writer::leaf_size(mesh_, LeafPrims(tree_, slot).span()).units};
         const Treelet treelet = gather_treelet(tree_, slot.split);
         Size size;
         for (int i = 0; i < treelet.count; ++i) {
             const Slot& child = treelet.slots[static_cast<std::size_t>(i)];
             const Size below = measure(child);
             size.nodes += below.nodes + (child.leaf ? 0 : 1);
-            size.blocks += below.blocks;
+            size.leaf_units += below.leaf_units;
         }
         return size;
     }
@@ -129,8 +144,8 @@ private:
                 Subtree& subtree = subtrees[next_subtree++];
                 subtree.node = node;
                 subtree.depth = 1;
-                children[static_cast<std::size_t>(i)] =
-                    slot.leaf ? block_child(subtree.first.blocks, subtree.size.blocks) : node_child(node);
+                Size at = subtree.first;
+                children[static_cast<std::size_t>(i)] = slot.leaf ? write_leaf(slot, at) : node_child(node);
             }
         }
         write_node(nodes_[place], treelet, children);
@@ -167,7 +182,8 @@ private:
         return box;
     }
 
-    void write_node(Node& node, const Treelet& treelet, const Children& children) const {
+    void write_node(StoredNode& out, const Treelet& treelet, const Children& children) const {
+        Node node;
         for (int i = 0; i < node_width; ++i) {
             const bool used = i < treelet.count;
             const Box box = used ? box_of(treelet.slots[static_cast<std::size_t>(i)]) : Box{};
@@ -180,40 +196,19 @@ private:
         }
         const SlotSequences order = options_.order == ChildOrder::treelet    ? treelet.order
                                     : options_.order == ChildOrder::diagonal ? sort_along_diagonals(node, treelet.count)
+                                    : options_.order == ChildOrder::slots    ? assign_places(node, treelet.count)
                                                                              : shuffle(node, treelet.count);
         write_order(node, order, treelet.count);
+        Writer::write_node(node, treelet.count, out);
     }
 
     std::uint32_t write_leaf(const Slot& slot, Size& cursor) const {
-        const std::size_t first = cursor.blocks;
-        std::array<std::uint32_t, block_width * max_leaf_blocks> prims;
-        const std::uint32_t count = slot.end - slot.begin;
-        for (std::uint32_t i = 0; i < count; ++i) prims[i] = tree_.refs[slot.begin + i].prim();
-        std::sort(prims.begin(), prims.begin() + count);
-        for (std::uint32_t i = 0; i < count; i += block_width) {
-            TriangleBlock& block = blocks_[cursor.blocks++];
-            if (count - i < block_width) clear_block(block);
-            for (std::uint32_t k = 0; k < std::min<std::uint32_t>(block_width, count - i); ++k)
-                write_triangle(block, k, prims[i + k]);
-        }
-        return block_child(first, cursor.blocks - first);
-    }
-
-    static void clear_block(TriangleBlock& block) {
-        for (auto& row : block.rows)
-            for (float& value : row) value = std::numeric_limits<float>::quiet_NaN();
-        for (std::int32_t& prim : block.prim) prim = -1;
-    }
-
-    void write_triangle(TriangleBlock& block, std::uint32_t lane, std::uint32_t prim) const {
-        for (int k = 0; k < 3; ++k) {
-            const float* corner = mesh_.corner(prim, k);
-            const float* first = mesh_.corner(prim, 0);
-            const bool edge = options_.accuracy == Accuracy::fast && k > 0;
-            for (int axis = 0; axis < 3; ++axis)
-                block.rows[3 * k + axis][lane] = edge ? corner[axis] - first[axis] : corner[axis];
-        }
-        block.prim[lane] = static_cast<std::int32_t>(prim);
+        const LeafPrims prims(tree_, slot);
+        const std::size_t first = cursor.leaf_units;
+        const LeafSize size =
+            Writer::write_leaf(mesh_, options_.accuracy, prims.span(), leaves_ + first * unit_bytes);
+        cursor.leaf_units += size.units;
+        return leaf_child(first_leaf_unit_ + first, size.blocks);
     }
 
     // Larger than any plane with its slack, small enough that no arithmetic on it overflows.
@@ -223,16 +218,18 @@ private:
     const Mesh& mesh_;
     const BuildOptions& options_;
     const std::array<float, 3>& center_;
-    Node* nodes_ = nullptr;
-    TriangleBlock* blocks_ = nullptr;
-    std::size_t first_block_unit_ = 0;
+    StoredNode* nodes_ = nullptr;
+    std::byte* leaves_ = nullptr;
+    std::size_t first_leaf_unit_ = 0;
 };
 
 }  // namespace
 
 EmittedTree emit_tree(const BinaryTree& tree, const Mesh& mesh, const BuildOptions& options,
                       const std::array<float, 3>& center, unsigned threads) {
-    return Emitter(tree, mesh, options, center).emit(threads);
+    if (options.nodes == NodeForm::compressed)
+        return Emitter<CompressedWriter>(tree, mesh, options, center).emit(threads);
+    return Emitter<Float32Writer>(tree, mesh, options, center).emit(threads);
 }
 
 }  // namespace wive

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
 
 #include "binary_tree.h"
 #include "builder.h"
@@ -13,8 +14,14 @@ namespace wive {
 
 struct EmittedTree {
     LargeArray<std::byte> units;
-    std::size_t node_count, block_count;
+    std::size_t node_count;
     int depth;
+};
+
+// What a leaf takes, the units being those of unit_bytes.
+struct LeafSize {
+    std::size_t units;
+    std::uint32_t blocks;
 };
 
 // Children of a node stand side by side, then subtree after subtree; the same on any number of threads. Throws

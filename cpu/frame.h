@@ -23,6 +23,9 @@ namespace wive {
 // and the triangle test (triangle_watertight.h) moves a vertex sideways by at most 6u max(P + O). All of it is
 // below 12u M, M = max over the axes of (P + O); slack = |r| 16u M covers it. The near distance is lowered and the far
 // distance raised by it, so no box that holds a triangle the test accepts is ever missed.
+// Compressed planes (compressed_slabs.h) are met at fma(byte, step r, fma(origin, r, bias)). step r is exact, the step
+// being a power of two far from underflow; rounding the inner sum adds u(P + O), and the product of the byte 2u P where
+// there is no fused multiply-add. Such planes may lie up to a step outside, which is below P / 60: 15u M in all.
 // A component smaller than 2^-30 of the longest counts as that, with its sign: along the ray that moves a point by
 // less than 2^-29 M, which the same slack covers. (A subnormal direction stays shorter than 1 when scaled.)
 template <class Isa>
@@ -37,7 +40,7 @@ struct RayFrame {
     alignas(16) float far_bias[4];
     float tmin, tmax;
     float scale;  // t of the caller's ray = scale * t here
-    std::uint32_t near_row[3];  // bytes from a node to the planes that the ray meets first; its far row is the other one
+    std::uint32_t near_row[3];  // in planes from a node's first one: the row that the ray meets first; its far row is the other one
     unsigned octant;  // bit a: negative on axis a, from the sign of the reciprocal
     unsigned longest_axis;
 
@@ -72,7 +75,7 @@ struct RayFrame {
         const Float4 distance = relative * reciprocal, slack = size * Float4::all(reach * slack_factor);
         octant = sign_bits(scaled) & 7u;
         longest_axis = static_cast<unsigned>(std::countr_zero(less_equal(Float4::all(longest), lengths)));
-        for (unsigned axis = 0; axis < 3; ++axis) near_row[axis] = row_bytes * (2 * axis + (octant >> axis & 1u));
+        for (unsigned axis = 0; axis < 3; ++axis) near_row[axis] = node_width * (2 * axis + (octant >> axis & 1u));
         caller_origin.store(origin);
         scaled.store(direction);
         reciprocal.store(rdir);

@@ -12,9 +12,11 @@ namespace wive {
 // by negating reciprocal and bias there.
 template <class Isa>
 struct HalfSlabs {
+    using Form = Float32Form;
+
     __m512 rdir[3], bias[3];
     __m512 tmin_and_tmax;
-    std::size_t near_row[3], far_row[3];  // in bytes from the node
+    std::size_t near_row[3], far_row[3];  // in planes from the node's first
     unsigned order_shift;
 
     WIVE_INLINE explicit HalfSlabs(const RayFrame<Isa>& ray) : tmin_and_tmax(both(ray.tmin, -ray.tmax)) {
@@ -22,14 +24,14 @@ struct HalfSlabs {
             rdir[axis] = both(ray.rdir[axis], -ray.rdir[axis]);
             bias[axis] = both(ray.near_bias[axis], -ray.far_bias[axis]);
             near_row[axis] = ray.near_row[axis];
-            far_row[axis] = ray.near_row[axis] ^ row_bytes;
+            far_row[axis] = ray.near_row[axis] ^ node_width;
         }
         order_shift = 4 * (7 - ray.octant);
     }
 
     WIVE_INLINE typename Isa::Order order(const Node& node) const { return {node.order, order_shift}; }
 
-    WIVE_INLINE Interval<typename Isa::Float8> test(const Node& node, float tmax) const {
+    WIVE_INLINE Entries<Isa> test(const Node& node, float tmax) const {
         const auto planes = [&](unsigned axis) {
             const __m512 near_far =
                 _mm512_insertf32x8(_mm512_castps256_ps512(_mm256_load_ps(row(node, near_row[axis]))),
@@ -38,7 +40,8 @@ struct HalfSlabs {
         };
         const __m512 interval = _mm512_mask_broadcastss_ps(tmin_and_tmax, 0xff00, _mm_set_ss(-tmax));
         const __m512 t = _mm512_max_ps(_mm512_max_ps(planes(0), planes(1)), _mm512_max_ps(planes(2), interval));
-        return {{_mm512_castps512_ps256(t)}, {_mm256_xor_ps(_mm512_extractf32x8_ps(t, 1), _mm256_set1_ps(-0.0f))}};
+        const AvxFloat8 tnear = {_mm512_castps512_ps256(t)};
+        return {tnear, hits(tnear, {_mm256_xor_ps(_mm512_extractf32x8_ps(t, 1), _mm256_set1_ps(-0.0f))})};
     }
 
 private:

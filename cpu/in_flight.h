@@ -25,6 +25,8 @@ template <class Isa, template <class> class Slabs, template <class> class Triang
 class InFlight {
 public:
     using State = Flight<typename Triangles<Isa>::Frame, Query, Counters>;
+    using Form = typename Slabs<Isa>::Form;
+    using Corners = typename Form::template Corners<Isa>;
 
     [[gnu::always_inline]] InFlight(const BvhView& bvh, const RayBatch& rays, const HitBatch& hits,
                                     const RaySource& source, std::byte* scratch)
@@ -75,7 +77,7 @@ private:
             while (top.distance() > f.query.tmax) top.move(-1);
         f.top = top;
         const std::uint32_t child = top.child();
-        prefetch(bvh, child);
+        prefetch<Form>(bvh, child);
         const bool inner = is_inner(child), end = child == end_of_stack;
         *ends.node = *ends.leaf = *ends.done = &f;
         ends.node += inner;
@@ -91,7 +93,7 @@ private:
             State& f = **i;
             Stack::Top top = f.top;
             f.counters.inner_node();
-            visit<Query::in_order>(bvh.node(top.child()), Slabs<Isa>(f.ray), f.query.tmax, top);
+            visit<Query::in_order>(bvh.template node<Form>(top.child()), Slabs<Isa>(f.ray), f.query.tmax, top);
             wait(bvh, f, top, ends);
         }
         ends_ = ends;
@@ -106,8 +108,8 @@ private:
             Stack::Top top = f.top;
             const std::uint32_t child = top.child();
             f.counters.leaf();
-            const bool finished = test_leaf(bvh.leaf(child), leaf_block_count(child),
-                                            Triangles<Isa>(f.ray), f.query, f.counters);
+            const bool finished = test_leaf<Corners>(bvh.template leaf<Form>(child), leaf_block_count(child),
+                                                     Triangles<Isa>(f.ray), f.query, f.counters);
             if (finished) top = Stack::Top(f.stack);
             top.move(-1);
             wait(bvh, f, top, ends);

@@ -15,29 +15,47 @@
 
 namespace wive {
 
-template <class Isa, template <class> class Slabs>
+// The slab test of nodes that a table has no kernels for.
+template <class>
+struct NoSlabs;
+
+template <class Isa, template <class> class ForFloat32, template <class> class ForCompressed>
 struct KernelMaker {
     template <QueryKind kind>
     using Query = std::tuple_element_t<static_cast<std::size_t>(kind), std::tuple<ClosestHit, AnyHit, AllHits, CountHits>>;
 
-    template <template <class> class Triangles, class Query, bool counting>
+    template <template <class> class Slabs, template <class> class Triangles, class Query, bool counting>
     struct Kernel {
         static constexpr TraceBatch trace =
             trace_batch<Isa, Slabs, Triangles, Query, std::conditional_t<counting, StepCounters, NoCounters>>;
         static constexpr std::size_t flight_bytes = sizeof(Flight<typename Triangles<Isa>::Frame, Query, StepCounters>);
     };
+    struct NoKernel {
+        static constexpr TraceBatch trace = nullptr;
+        static constexpr std::size_t flight_bytes = 0;
+    };
+
+    template <KernelChoice choice, template <class> class Slabs>
+    static constexpr auto kernel_with() {
+        using Asked = Query<choice.query>;
+        if constexpr (std::is_same_v<Slabs<Isa>, NoSlabs<Isa>>)
+            return NoKernel{};
+        else if constexpr (choice.accuracy == Accuracy::fast)
+            return Kernel<Slabs, FastTriangles, Asked, choice.counting>{};
+        else if constexpr (choice.accuracy == Accuracy::watertight)
+            return Kernel<Slabs, WatertightTriangles, Asked, choice.counting>{};
+        else if constexpr (choice.query == QueryKind::closest)
+            return Kernel<Slabs, ExactTriangles, ExactClosestHit<typename Slabs<Isa>::Form::Block>, choice.counting>{};
+        else
+            return Kernel<Slabs, ExactTriangles, Asked, choice.counting>{};
+    }
 
     template <KernelChoice choice>
     static constexpr auto kernel() {
-        using Asked = Query<choice.query>;
-        if constexpr (choice.accuracy == Accuracy::fast)
-            return Kernel<FastTriangles, Asked, choice.counting>{};
-        else if constexpr (choice.accuracy == Accuracy::watertight)
-            return Kernel<WatertightTriangles, Asked, choice.counting>{};
-        else if constexpr (choice.query == QueryKind::closest)
-            return Kernel<ExactTriangles, ExactClosestHit, choice.counting>{};
+        if constexpr (choice.nodes == NodeForm::float32)
+            return kernel_with<choice, ForFloat32>();
         else
-            return Kernel<ExactTriangles, Asked, choice.counting>{};
+            return kernel_with<choice, ForCompressed>();
     }
 
     template <std::size_t... index>
@@ -48,9 +66,9 @@ struct KernelMaker {
     }
 };
 
-template <class Isa, template <class> class Slabs>
+template <class Isa, template <class> class ForFloat32, template <class> class ForCompressed = NoSlabs>
 constexpr KernelTable make_kernel_table(std::string_view name) {
-    return KernelMaker<Isa, Slabs>::table(name, std::make_index_sequence<kernel_count>());
+    return KernelMaker<Isa, ForFloat32, ForCompressed>::table(name, std::make_index_sequence<kernel_count>());
 }
 
 }  // namespace wive

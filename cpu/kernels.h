@@ -2,6 +2,8 @@
 #pragma once
 
 #include <array>
+#include <stdexcept>
+#include <string>
 #include <string_view>
 
 #include "layout.h"
@@ -16,17 +18,20 @@ inline constexpr int query_count = 4;
 struct KernelChoice {
     QueryKind query;
     Accuracy accuracy;
+    NodeForm nodes;
     bool counting;  // of steps, per ray
 };
-inline constexpr std::size_t kernel_count = query_count * accuracy_count * 2;
+inline constexpr std::size_t kernel_count = query_count * accuracy_count * node_form_count * 2;
 
 constexpr std::size_t kernel_index(KernelChoice choice) {
-    return (static_cast<std::size_t>(choice.query) * accuracy_count + static_cast<std::size_t>(choice.accuracy)) * 2 +
-           choice.counting;
+    const std::size_t made_for =
+        static_cast<std::size_t>(choice.query) * accuracy_count + static_cast<std::size_t>(choice.accuracy);
+    return (made_for * node_form_count + static_cast<std::size_t>(choice.nodes)) * 2 + choice.counting;
 }
 constexpr KernelChoice kernel_choice(std::size_t index) {
-    return {static_cast<QueryKind>(index / 2 / accuracy_count), static_cast<Accuracy>(index / 2 % accuracy_count),
-            index % 2 != 0};
+    const std::size_t made_for = index / 2 / node_form_count;
+    return {static_cast<QueryKind>(made_for / accuracy_count), static_cast<Accuracy>(made_for % accuracy_count),
+            static_cast<NodeForm>(index / 2 % node_form_count), index % 2 != 0};
 }
 
 // One thread's share of a batch: rays come from the source until it is empty. in_flight rays are traced in turns;
@@ -39,12 +44,19 @@ struct KernelTable {
     std::size_t flight_bytes;  // of the largest kernel
     std::array<TraceBatch, kernel_count> kernels;
 
-    TraceBatch find(KernelChoice choice) const { return kernels[kernel_index(choice)]; }
+    // Throws std::invalid_argument where the table was not made for such nodes.
+    TraceBatch find(KernelChoice choice) const {
+        const TraceBatch kernel = kernels[kernel_index(choice)];
+        if (kernel == nullptr)
+            throw std::invalid_argument("kernel '" + std::string(name) + "' traces float32 nodes only: build with nodes 'float32'");
+        return kernel;
+    }
 };
 
 // Null where this build has no such kernels; whether the machine can run them is dispatch.h's business.
 const KernelTable* avx512_full_kernels();
 const KernelTable* avx512_half_kernels();
+const KernelTable* avx512_by_distance_kernels();
 const KernelTable* avx2_kernels();
 const KernelTable* scalar_kernels();
 const KernelTable* scalar_by_distance_kernels();

@@ -1,12 +1,13 @@
 #include "kernels.h"
 
 #if defined(__AVX2__)
+#include "compressed_slabs.h"
 #include "kernel_table.h"
 #include "simd_avx2.h"
 #include "slabs.h"
 
 namespace wive {
-static constexpr KernelTable table = make_kernel_table<Avx2, FullSlabs>("avx2");
+static constexpr KernelTable table = make_kernel_table<Avx2, FullSlabs, CompressedSlabs>("avx2");
 const KernelTable* avx2_kernels() { return &table; }
 }  // namespace wive
 #else

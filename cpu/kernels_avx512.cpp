@@ -1,13 +1,14 @@
 #include "kernels.h"
 
 #if defined(__AVX512F__)
+#include "compressed_slabs.h"
 #include "half_slabs_avx512.h"
 #include "kernel_table.h"
 #include "simd_avx512.h"
 #include "slabs.h"
 
 namespace wive {
-static constexpr KernelTable full = make_kernel_table<Avx512, FullSlabs>("avx512.full");
+static constexpr KernelTable full = make_kernel_table<Avx512, FullSlabs, CompressedSlabs>("avx512.full");
 static constexpr KernelTable half = make_kernel_table<Avx512, HalfSlabs>("avx512.half");
 const KernelTable* avx512_full_kernels() { return &full; }
 const KernelTable* avx512_half_kernels() { return &half; }

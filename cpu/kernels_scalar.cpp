@@ -1,9 +1,10 @@
+#include "compressed_slabs.h"
 #include "kernel_table.h"
 #include "simd_scalar.h"
 #include "slabs.h"
 
 namespace wive {
-static constexpr KernelTable stored = make_kernel_table<Scalar, FullSlabs>("scalar");
+static constexpr KernelTable stored = make_kernel_table<Scalar, FullSlabs, CompressedSlabs>("scalar");
 static constexpr KernelTable by_distance = make_kernel_table<ScalarByDistance, FullSlabs>("scalar.distance");
 const KernelTable* scalar_kernels() { return &stored; }
 const KernelTable* scalar_by_distance_kernels() { return &by_distance; }

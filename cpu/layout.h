@@ -17,20 +17,29 @@ struct alignas(64) Node {
     float planes[6][node_width];  // lo.x hi.x lo.y hi.y lo.z hi.z
     std::uint32_t child[node_width];
     std::uint32_t order[node_width];
+
+    double plane(int row, int lane) const { return planes[row][lane]; }
 };
 static_assert(sizeof(Node) == 256);
-inline constexpr std::uint32_t row_bytes = sizeof(Node::planes[0]);
 
 // Four triangles side by side. rows[3 * k + axis] holds vertex k, or v0, v1 - v0, v2 - v0 (fast).
 // Unused lanes hold NaN, which passes no test, and prim -1.
 struct alignas(32) TriangleBlock {
     float rows[9][block_width];
     std::int32_t prim[block_width];
+
+    float vertex(int k, int axis, int lane) const { return rows[3 * k + axis][lane]; }  // watertight
+    std::int32_t prim_at(int lane) const { return prim[lane]; }
+    const TriangleBlock* next() const { return this + 1; }
 };
 static_assert(sizeof(TriangleBlock) == 160);
 
+// What a tree is stored as: the nodes and blocks above, or those of compressed.h.
+enum class NodeForm { float32, compressed };
+inline constexpr int node_form_count = 2;
+
 // Nodes and blocks stand in one piece of memory, first the nodes, then the blocks, counted in units of 32 bytes:
-// a node is eight units, a block five. A child reference holds the unit where the child begins, times eight; a
+// a node is eight units, a block five (compressed: four, and three or four). A child reference holds the unit where the child begins, times eight; a
 // leaf sets leaf_bit and puts its number of blocks, less one, in the low three bits. So one mask and one shift lead
 // to a child of either kind.
 inline constexpr std::size_t unit_bytes = 32;
@@ -60,11 +69,13 @@ struct BvhView {
     alignas(16) float center[4];  // planes are relative to this point; the fourth lane is zero
     alignas(16) float extent[4];  // the largest |plane| on each axis
 
-    [[gnu::always_inline]] const Node& node(std::uint32_t child) const {  // an inner child has nothing to mask
-        return *reinterpret_cast<const Node*>(units + std::size_t{child} * (unit_bytes / 8));
+    template <class Form>
+    [[gnu::always_inline]] const typename Form::Node& node(std::uint32_t child) const {  // an inner child has nothing to mask
+        return *reinterpret_cast<const typename Form::Node*>(units + std::size_t{child} * (unit_bytes / 8));
     }
-    [[gnu::always_inline]] const TriangleBlock* leaf(std::uint32_t child) const {
-        return reinterpret_cast<const TriangleBlock*>(units + child_offset(child));
+    template <class Form>
+    [[gnu::always_inline]] const typename Form::Block* leaf(std::uint32_t child) const {
+        return reinterpret_cast<const typename Form::Block*>(units + child_offset(child));
     }
 };
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <limits>
 #include <numeric>
 
 #include "random.h"
@@ -43,6 +44,55 @@ SlotSequences sort_along_diagonals(const Node& node, int children) {
                 const float centre = node.planes[2 * axis][i] + node.planes[2 * axis + 1][i];
                 key[static_cast<std::size_t>(i)] += (octant >> axis & 1u) ? -centre : centre;
             }
+        sequences[octant] = sort_slots(key, children);
+    }
+    return sequences;
+}
+
+SlotSequences assign_places(const Node& node, int children) {
+    // cost[i][s]: how far child i lies along the diagonal on which place s is met first. The node's own centre would
+    // move all costs of a child set alike, and so no assignment.
+    std::array<std::array<float, node_width>, node_width> cost{};
+    for (unsigned i = 0; i < static_cast<unsigned>(children); ++i)
+        for (unsigned place = 0; place < node_width; ++place)
+            for (unsigned axis = 0; axis < 3; ++axis) {
+                const float centre = node.planes[2 * axis][i] + node.planes[2 * axis + 1][i];
+                cost[i][place] += (place >> axis & 1u) ? -centre : centre;
+            }
+    // The cheapest assignment, exactly (the paper's auction comes near it): least[used] is the least cost of giving the
+    // first children the places in the set `used`, as many as there are.
+    std::array<float, 1u << node_width> least;
+    std::array<unsigned, 1u << node_width> last_place;
+    least.fill(std::numeric_limits<float>::infinity());
+    least[0] = 0;
+    unsigned cheapest = 0;
+    float cheapest_cost = std::numeric_limits<float>::infinity();
+    for (unsigned used = 0; used < least.size(); ++used) {
+        const auto child = static_cast<unsigned>(std::popcount(used));
+        if (child == static_cast<unsigned>(children)) {
+            if (least[used] < cheapest_cost) {
+                cheapest_cost = least[used];
+                cheapest = used;
+            }
+            continue;
+        }
+        if (child > static_cast<unsigned>(children)) continue;
+        for (unsigned place = 0; place < node_width; ++place) {
+            const unsigned next = used | 1u << place;
+            const float sum = least[used] + cost[child][place];
+            if (next != used && sum < least[next]) {
+                least[next] = sum;
+                last_place[next] = place;
+            }
+        }
+    }
+    std::array<unsigned, node_width> place_of{};
+    for (unsigned used = cheapest, child = static_cast<unsigned>(children); child-- > 0; used ^= 1u << last_place[used])
+        place_of[child] = last_place[used];
+    SlotSequences sequences;
+    for (unsigned octant = 0; octant < 8; ++octant) {
+        std::array<unsigned, node_width> key{};
+        for (std::size_t i = 0; i < node_width; ++i) key[i] = place_of[i] ^ octant;
         sequences[octant] = sort_slots(key, children);
     }
     return sequences;

@@ -9,9 +9,9 @@
 namespace wive {
 
 // treelet: a depth-first walk of the binary treelet that swaps sides where the ray is negative on the split axis
-// (the paper's). diagonal: children sorted along the octant's diagonal. none: shuffled, the same for every octant; what
-// having no order costs.
-enum class ChildOrder { treelet, diagonal, none };
+// (the paper's). diagonal: children sorted along the octant's diagonal. slots: children assigned to eight slots, visited by
+// slot number xor octant. none: shuffled, the same for every octant; what having no order costs.
+enum class ChildOrder { treelet, diagonal, slots, none };
 
 // For each octant, slots from front to back, four bits each, the first in the lowest bits.
 using SlotSequences = std::array<std::uint32_t, 8>;
@@ -27,6 +27,12 @@ SlotSequences join(const SlotSequences& left, int left_count, const SlotSequence
 
 // Slots sorted by their boxes' centres along each octant's diagonal.
 SlotSequences sort_along_diagonals(const Node& node, int children);
+
+// The order of Ylitie, Karras, Laine 2017, "Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs",
+// section 3.2: each child has one of eight places, and a ray of octant o visits places 0 ^ o, 1 ^ o, ... 7 ^ o. There a
+// child's place is where it stands in the node and the order costs no memory; here it is written out like any other, so
+// that the same kernels follow it.
+SlotSequences assign_places(const Node& node, int children);
 
 // Slots in an order that has nothing to do with where they are. (By slot would be octant 0's own order.)
 SlotSequences shuffle(const Node& node, int children);

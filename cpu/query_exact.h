@@ -9,6 +9,7 @@ namespace wive {
 
 // Every hit is offered with its t as the caller counts it, the nearest float to the exact value. Rounding keeps the
 // order of what it does not make equal; what it does is compared exactly, so the best hit's triangle is remembered.
+template <class Block>
 struct ExactClosestHit {
     static constexpr bool in_order = true;
     static constexpr bool crossings = false;
@@ -17,15 +18,15 @@ struct ExactClosestHit {
     float tmin, tmax;  // for the boxes, in the frame's units; tmax shrinks to the best hit
     HitNumbers best{};
     std::uint32_t prim = no_prim;
-    const TriangleBlock* block = nullptr;
+    const Block* block = nullptr;
     int lane = 0;
 
     // compare(block, lane): the sign of the exact t offered less that of another triangle. unscale: t in the
     // frame's units over the caller's.
     template <class Compare>
-    [[gnu::always_inline]] bool take(const HitNumbers& hit, const TriangleBlock& hit_block, int hit_lane, float unscale,
+    [[gnu::always_inline]] bool take(const HitNumbers& hit, const Block& hit_block, int hit_lane, float unscale,
                                      const Compare& compare) {
-        const auto hit_prim = static_cast<std::uint32_t>(hit_block.prim[hit_lane]);
+        const auto hit_prim = static_cast<std::uint32_t>(hit_block.prim_at(hit_lane));
         if (prim != no_prim) {
             if (hit.t > best.t) return false;
             if (hit.t == best.t) [[unlikely]] {

@@ -112,12 +112,17 @@ private:
         t_.resize(paths_.size());
         prim_.resize(paths_.size());
         uv_.resize(2 * paths_.size());
+        if (const ForeignTracer& other = job_.tracer; other.function) {
+            other.function(other.context, paths_.size(), origins_.data(), directions_.data(), zero, infinity, t_.data(),
+                           prim_.data(), uv_.data());
+            return;
+        }
         HitBatch hits;
         hits.t = t_.data();
         hits.prim = prim_.data();
         hits.uv = uv_.data();
-        wive::trace(job_.kernels, job_.kernels.find({QueryKind::closest, job_.accuracy, false}), job_.bvh,
-                    {origins_.data(), directions_.data(), &zero, &infinity, 0, 0}, hits, paths_.size(), 1, 0);
+        wive::trace(job_.kernels, job_.kernels.find({QueryKind::closest, job_.accuracy, job_.nodes, false}), job_.bvh,
+                    {origins_.data(), directions_.data(), &zero, &infinity, 0, 0}, hits, paths_.size(), 1, job_.in_flight);
     }
 
     // Paths that escape bring the sky's light home; the others bounce, until they have bounced enough.

@@ -6,6 +6,8 @@
 
 #include <cstdint>
 
+#include "layout.h"
+
 #define WIVE_INLINE [[gnu::always_inline]] inline
 
 namespace wive {
@@ -84,11 +86,22 @@ struct AvxHits {
     WIVE_INLINE unsigned first() const { return _tzcnt_u32(static_cast<unsigned>(_mm256_movemask_ps(v))); }
 };
 
+// Those with a child: the hits of a node's lanes, without the empty ones.
+WIVE_INLINE AvxHits with_child(AvxHits hits, const std::uint32_t* child) {
+    const __m256i children = _mm256_load_si256(reinterpret_cast<const __m256i*>(child));
+    const __m256i empty = _mm256_cmpeq_epi32(children, _mm256_set1_epi32(static_cast<int>(end_of_stack)));
+    return {_mm256_andnot_ps(_mm256_castsi256_ps(empty), hits.v)};
+}
+
 struct AvxFloat8 {
     __m256 v;
 
     WIVE_INLINE static AvxFloat8 load(const float* p) { return {_mm256_load_ps(p)}; }
+    WIVE_INLINE static AvxFloat8 load(const std::uint8_t* p) {
+        return {_mm256_cvtepi32_ps(_mm256_cvtepu8_epi32(_mm_loadl_epi64(reinterpret_cast<const __m128i*>(p))))};
+    }
     WIVE_INLINE static AvxFloat8 all(float x) { return {_mm256_set1_ps(x)}; }
+    WIVE_INLINE friend AvxFloat8 operator*(AvxFloat8 a, AvxFloat8 b) { return {_mm256_mul_ps(a.v, b.v)}; }
     WIVE_INLINE friend AvxFloat8 multiply_add(AvxFloat8 a, AvxFloat8 b, AvxFloat8 c) {
         return {_mm256_fmadd_ps(a.v, b.v, c.v)};
     }
@@ -105,6 +118,25 @@ struct AvxOrder {
     WIVE_INLINE AvxOrder(const std::uint32_t* row, unsigned shift)
         : slots(_mm256_srl_epi32(_mm256_load_si256(reinterpret_cast<const __m256i*>(row)),
                                  _mm_cvtsi32_si128(static_cast<int>(shift)))) {}
+    // Of lanes of three bytes. The last load reads four bytes past them.
+    WIVE_INLINE AvxOrder(const std::uint8_t (*row)[3], unsigned shift) {
+        const auto four_lanes = [&](int lane) { return _mm_loadu_si128(reinterpret_cast<const __m128i*>(row + lane)); };
+        const __m256i bytes = _mm256_inserti128_si256(_mm256_castsi128_si256(four_lanes(0)), four_lanes(4), 1);
+        const __m256i spread = _mm256_broadcastsi128_si256(
+            _mm_setr_epi8(0, 1, 2, -1, 3, 4, 5, -1, 6, 7, 8, -1, 9, 10, 11, -1));
+        slots = _mm256_srl_epi32(_mm256_shuffle_epi8(bytes, spread), _mm_cvtsi32_si128(static_cast<int>(shift)));
+    }
+};
+
+// Four of the first eight floats from an address, chosen by four bits each: those of `word` from bit `shift` on.
+struct AvxPick {
+    __m128i index;
+    WIVE_INLINE AvxPick(std::uint32_t word, int shift)
+        : index(_mm_srlv_epi32(_mm_set1_epi32(static_cast<int>(word)),
+                               _mm_setr_epi32(shift, shift + 4, shift + 8, shift + 12))) {}
+    WIVE_INLINE SseFloat4 operator()(const float* p) const {
+        return {_mm256_castps256_ps128(_mm256_permutevar8x32_ps(_mm256_loadu_ps(p), _mm256_castsi128_si256(index)))};
+    }
 };
 
 // The child in the last lane that was hit, of at least one. It goes through memory, where it was stored before the

@@ -24,6 +24,7 @@ struct Avx2 {
     using Float8 = AvxFloat8;
     using Hits = AvxHits;
     using Order = AvxOrder;
+    using Pick = AvxPick;
 
     // As Avx512::Lanes.
     template <bool in_order>

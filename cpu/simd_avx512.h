@@ -13,6 +13,7 @@ struct Avx512 {
     using Float8 = AvxFloat8;
     using Hits = AvxHits;
     using Order = AvxOrder;
+    using Pick = AvxPick;
 
     // Lanes on their way to the stack: children, distances and which of them hit.
     template <bool in_order>

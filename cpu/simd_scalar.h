@@ -27,6 +27,9 @@ struct ScalarLanes {
     WIVE_INLINE static ScalarLanes load(const Number* p) {
         return each([&](int i) { return p[i]; });
     }
+    WIVE_INLINE static ScalarLanes load(const std::uint8_t* p) {
+        return each([&](int i) { return static_cast<Number>(p[i]); });
+    }
     WIVE_INLINE static ScalarLanes all(Number x) {
         return each([&](int) { return x; });
     }
@@ -108,6 +111,11 @@ struct ScalarHits {
 WIVE_INLINE ScalarHits hits(const ScalarLanes<float, 8>& tnear, const ScalarLanes<float, 8>& tfar) {
     return {less_equal(tnear, tfar)};
 }
+WIVE_INLINE ScalarHits with_child(ScalarHits hits, const std::uint32_t* child) {
+    unsigned used = 0;
+    for (int i = 0; i < node_width; ++i) used |= static_cast<unsigned>(child[i] != end_of_stack) << i;
+    return {hits.mask & used};
+}
 
 struct Scalar {
     using Float4 = ScalarLanes<float, 4>;
@@ -115,9 +123,26 @@ struct Scalar {
     using Float8 = ScalarLanes<float, 8>;
 
     struct Order {
-        const std::uint32_t* row;
-        unsigned shift;
-        WIVE_INLINE unsigned slot(int i) const { return row[i] >> shift & 7u; }
+        std::uint32_t slots[node_width];
+        WIVE_INLINE Order(const std::uint32_t* row, unsigned shift) {
+            for (int i = 0; i < node_width; ++i) slots[i] = row[i] >> shift & 7u;
+        }
+        WIVE_INLINE Order(const std::uint8_t (*row)[3], unsigned shift) {
+            for (int i = 0; i < node_width; ++i) {
+                const std::uint32_t lane = row[i][0] | std::uint32_t{row[i][1]} << 8 | std::uint32_t{row[i][2]} << 16;
+                slots[i] = lane >> shift & 7u;
+            }
+        }
+        WIVE_INLINE unsigned slot(int i) const { return slots[i]; }
+    };
+
+    // As AvxPick.
+    struct Pick {
+        std::uint32_t index;
+        WIVE_INLINE Pick(std::uint32_t word, int shift) : index(word >> shift) {}
+        WIVE_INLINE Float4 operator()(const float* p) const {
+            return Float4::each([&](int i) { return p[index >> 4 * i & 7u]; });
+        }
     };
 
     using Hits = ScalarHits;
@@ -130,7 +155,7 @@ struct Scalar {
         const std::uint32_t* child;
         unsigned slots[node_width];
 
-        WIVE_INLINE Lanes(Order order, Hits hit, const Float8& distances, const std::uint32_t* children)
+        WIVE_INLINE Lanes(const Order& order, Hits hit, const Float8& distances, const std::uint32_t* children)
             : by_slot(hit), tnear(distances), child(children) {
             for (int i = 0; i < node_width; ++i) slots[i] = in_order ? order.slot(i) : static_cast<unsigned>(i);
         }
@@ -153,7 +178,7 @@ struct Scalar {
 struct ScalarByDistance : Scalar {
     template <bool in_order>
     struct Lanes : Scalar::Lanes<in_order> {
-        WIVE_INLINE Lanes(Order order, Hits hit, const Float8& distances, const std::uint32_t* children)
+        WIVE_INLINE Lanes(const Order& order, Hits hit, const Float8& distances, const std::uint32_t* children)
             : Scalar::Lanes<in_order>(order, hit, distances, children) {
             for (int i = 1; i < node_width; ++i)
                 for (int k = i; k > 0 && distances.v[this->slots[k - 1]] < distances.v[this->slots[k]]; --k)

@@ -1,7 +1,7 @@
 // WiVe: single-ray traversal of the 8-wide tree, the same steps for every node whatever it holds.
 //
 // Fuetterling, Lojewski, Pfreundt, Hamann, Ebert: "Accelerated Single Ray Tracing for Wide Vector Units", HPG 2017.
-// Isa picks the instruction set, Slabs the form (full or half), Triangles the accuracy, Query what is asked,
+// Isa picks the instruction set, Slabs the form of the slab test and of the nodes, Triangles the accuracy, Query what is asked,
 // Counters whether steps are counted. A kernel holds only the code of what it was made for.
 #pragma once
 
@@ -17,7 +17,7 @@ namespace wive {
 struct NoCounters {
     [[gnu::always_inline]] void inner_node() {}
     [[gnu::always_inline]] void leaf() {}
-    [[gnu::always_inline]] void block(const TriangleBlock&) {}
+    [[gnu::always_inline]] void block(const auto&) {}
     [[gnu::always_inline]] void write(const HitBatch&, std::size_t) const {}
 };
 
@@ -26,8 +26,8 @@ struct StepCounters {
 
     [[gnu::always_inline]] void inner_node() { ++inner_nodes; }
     [[gnu::always_inline]] void leaf() { ++leaves; }
-    [[gnu::always_inline]] void block(const TriangleBlock& block) {
-        for (const std::int32_t prim : block.prim) triangles += prim >= 0;
+    [[gnu::always_inline]] void block(const auto& block) {
+        for (int lane = 0; lane < block_width; ++lane) triangles += block.prim_at(lane) >= 0;
     }
     [[gnu::always_inline]] void write(const HitBatch& hits, std::size_t i) const {
         hits.stats[3 * i] = inner_nodes;
@@ -36,20 +36,22 @@ struct StepCounters {
     }
 };
 
-// Starts loading four cache lines of what a child reference points to: a whole node, or one block and more. The
+// Starts loading the first cache lines of what a child reference points to: a whole node, or one block and more. The
 // address is an integer, because end_of_stack points nowhere; a prefetch of such an address does nothing.
+template <class Form>
 [[gnu::always_inline]] inline void prefetch(const BvhView& bvh, std::uint32_t child) {
     const std::uintptr_t address = reinterpret_cast<std::uintptr_t>(bvh.units) + child_offset(child);
-    for (unsigned line = 0; line < 4; ++line) __builtin_prefetch(reinterpret_cast<const void*>(address + 64 * line));
+    for (unsigned line = 0; line < Form::prefetched_lines; ++line)
+        __builtin_prefetch(reinterpret_cast<const void*>(address + 64 * line));
 }
 
 // Offers the triangles of a leaf to the query; true once the query is done.
-template <class Triangles, class Query, class Counters>
-[[gnu::always_inline]] inline bool test_leaf(const TriangleBlock* block, std::uint32_t count, const Triangles& triangles,
-                                             Query& query, Counters& counters) {
-    for (std::uint32_t i = 0; i < count; ++i) {
-        counters.block(block[i]);
-        if (triangles.test(block[i], query)) return true;
+template <class Corners, class Triangles, class Query, class Counters>
+[[gnu::always_inline]] inline bool test_leaf(const typename Corners::Block* block, std::uint32_t count,
+                                             const Triangles& triangles, Query& query, Counters& counters) {
+    for (; count > 0; --count, block = block->next()) {
+        counters.block(*block);
+        if (triangles.test(Corners(*block), query)) return true;
     }
     return false;
 }
@@ -57,10 +59,10 @@ template <class Triangles, class Query, class Counters>
 // Visits an inner node: the children that the ray meets go onto the stack, and top moves to the last of them, the
 // nearest; or to the entry below, where none was met. No branch: the same steps for no hit and for eight.
 template <bool in_order, class Isa, template <class> class Slabs>
-[[gnu::always_inline]] inline void visit(const Node& node, const Slabs<Isa>& slabs, float tmax, Stack::Top& top) {
+[[gnu::always_inline]] inline void visit(const typename Slabs<Isa>::Form::Node& node, const Slabs<Isa>& slabs, float tmax,
+                                         Stack::Top& top) {
     const auto order = slabs.order(node);                                                     // (A) order
-    const auto [tnear, tfar] = slabs.test(node, tmax);                                        // (B) slabs
-    const auto hit = hits(tnear, tfar);
+    const auto [tnear, hit] = slabs.test(node, tmax);                                         // (B) slabs
     const typename Isa::template Lanes<in_order> lanes(order, hit, tnear, node.child);        // (C) permute,
     lanes.compress_to(top);                                                                   //     compress,
     top.move(static_cast<std::ptrdiff_t>(hit.count()) - 1);                                   // (D) store
@@ -72,26 +74,27 @@ template <bool in_order, class Isa, template <class> class Slabs>
 // 40 cycles a node without them, 21 with them, where rays are alike (docs/design.md).
 // Children are prefetched when they come to lie one and two below the top: the top is needed at once anyway.
 template <bool in_order, class Isa, template <class> class Slabs>
-[[gnu::always_inline]] inline std::uint32_t visit_and_take(const BvhView& bvh, const Node& node, const Slabs<Isa>& slabs,
-                                                           float tmax, Stack::Top& top) {
+[[gnu::always_inline]] inline std::uint32_t visit_and_take(const BvhView& bvh,
+                                                           const typename Slabs<Isa>::Form::Node& node,
+                                                           const Slabs<Isa>& slabs, float tmax, Stack::Top& top) {
+    using Form = typename Slabs<Isa>::Form;
     const auto order = slabs.order(node);
-    const auto [tnear, tfar] = slabs.test(node, tmax);
-    const auto hit = hits(tnear, tfar);
+    const auto [tnear, hit] = slabs.test(node, tmax);
     const unsigned count = hit.count();
     if (count == 0) {
         top.move(-1);
-        prefetch(bvh, top.child(-2));
+        prefetch<Form>(bvh, top.child(-2));
         return top.child();
     }
     if (count == 1) {
-        prefetch(bvh, top.child(-1));
+        prefetch<Form>(bvh, top.child(-1));
         return node.child[hit.first()];
     }
     const typename Isa::template Lanes<in_order> lanes(order, hit, tnear, node.child);
     lanes.compress_to(top);
     top.move(static_cast<std::ptrdiff_t>(count) - 1);
-    prefetch(bvh, top.child(-1));
-    prefetch(bvh, top.child(-2));
+    prefetch<Form>(bvh, top.child(-1));
+    prefetch<Form>(bvh, top.child(-2));
     return lanes.last_hit();
 }
 
@@ -104,9 +107,12 @@ template <class Query, class Isa>
         return {ray.tmin, ray.tmax};
 }
 
+// Comes with what is asked in `result` and leaves the answer there; meanwhile it is in registers.
 template <class Isa, template <class> class Slabs, template <class> class Triangles, class Query, class Counters>
 [[gnu::noinline]] void traverse(const BvhView& bvh, const typename Triangles<Isa>::Frame& ray, Query& result,
                                 Counters& counters) {
+    using Form = typename Slabs<Isa>::Form;
+    using Corners = typename Form::template Corners<Isa>;
     const Slabs<Isa> slabs(ray);
     Query query = result;
     Stack stack;
@@ -124,17 +130,18 @@ template <class Isa, template <class> class Slabs, template <class> class Triang
     for (;;) {
         while (is_inner(child)) {
             counters.inner_node();
-            child = visit_and_take<Query::in_order>(bvh, bvh.node(child), slabs, query.tmax, top);
+            child = visit_and_take<Query::in_order>(bvh, bvh.template node<Form>(child), slabs, query.tmax, top);
             skip_hidden();
         }
         if (child == end_of_stack) break;
         counters.leaf();
         // Made here, not before the loop: registers are for what nodes need.
         const Triangles<Isa> triangles(ray);
-        if (test_leaf(bvh.leaf(child), leaf_block_count(child), triangles, query, counters)) break;
+        const auto* blocks = bvh.template leaf<Form>(child);
+        if (test_leaf<Corners>(blocks, leaf_block_count(child), triangles, query, counters)) break;
         take_next();
         skip_hidden();
-        prefetch(bvh, top.child(-2));
+        prefetch<Form>(bvh, top.child(-2));
     }
     result = query;
 }

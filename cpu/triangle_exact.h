@@ -65,12 +65,12 @@ public:
     [[gnu::always_inline]] explicit ExactTriangles(const Frame& ray) : ray_(ray) {}
 
     // Offers every hit of the block to the query; true once the query is done.
-    template <class Query>
-    [[gnu::always_inline]] bool test(const TriangleBlock& block, Query& query) const {
+    template <class BlockCorners, class Query>
+    [[gnu::always_inline]] bool test(const BlockCorners& corners, Query& query) const {
         Double4 x[3], y[3], z[3], weight[3];
         const Double4 shear_x = Double4::all(ray_.shear[0]), shear_y = Double4::all(ray_.shear[1]);
-        for (int k = 0; k < 3; ++k) {
-            const auto away = [&](int i) { return corners(block, k, ray_.axis[i]) - Double4::all(ray_.from[i]); };
+        for (unsigned k = 0; k < 3; ++k) {
+            const auto away = [&](int i) { return widen(corners.vertex(k, ray_.axis[i])) - Double4::all(ray_.from[i]); };
             z[k] = away(2);
             x[k] = away(0) - shear_x * z[k];
             y[k] = away(1) - shear_y * z[k];
@@ -81,26 +81,24 @@ public:
         }
         const Double4 low = min(min(weight[0], weight[1]), weight[2]);
         const Double4 high = max(max(weight[0], weight[1]), weight[2]);
-        const unsigned lanes = less_equal(Double4::all(-ray_.bound), low) | less_equal(high, Double4::all(ray_.bound));
+        const unsigned lanes =
+            corners.used(less_equal(Double4::all(-ray_.bound), low) | less_equal(high, Double4::all(ray_.bound)));
         if (lanes == 0) [[likely]] return false;
-        return solve(block, lanes, x, y, z, weight, low, high, query);
+        return solve(corners.block, lanes, x, y, z, weight, low, high, query);
     }
 
 private:
-    // Four corners' coordinates on an axis, and one triangle's corners: the only places that know the block's layout.
-    [[gnu::always_inline]] static Double4 corners(const TriangleBlock& block, int k, std::size_t axis) {
-        return widen(Float4::load(block.rows[3 * static_cast<std::size_t>(k) + axis]));
-    }
-    [[gnu::noinline]] static Corners corners_of(const TriangleBlock& block, int lane) {
+    template <class Block>
+    [[gnu::noinline]] static Corners corners_of(const Block& block, int lane) {
         Corners one;
-        for (int i = 0; i < 9; ++i) one.v[i] = block.rows[i][lane];
+        for (int i = 0; i < 9; ++i) one.v[i] = block.vertex(i / 3, i % 3, lane);
         return one;
     }
 
-    template <class Query>
-    [[gnu::always_inline]] bool solve(const TriangleBlock& block, unsigned lanes, const Double4 (&x)[3],
-                                      const Double4 (&y)[3], const Double4 (&z)[3], const Double4 (&weight)[3],
-                                      Double4 low, Double4 high, Query& query) const {
+    template <class Block, class Query>
+    [[gnu::always_inline]] bool solve(const Block& block, unsigned lanes, const Double4 (&x)[3], const Double4 (&y)[3],
+                                      const Double4 (&z)[3], const Double4 (&weight)[3], Double4 low, Double4 high,
+                                      Query& query) const {
         constexpr double e = 0x1p-53;
         // The error of these weights: e (r + 4 e Z) (13 r + 21 Z).
         const Double4 near = min(min(z[0], z[1]), z[2]), far = max(max(z[0], z[1]), z[2]);
@@ -145,7 +143,8 @@ private:
     }
 
     // Rounding keeps order, so only where t rounds to a limit can it have crossed it.
-    [[gnu::always_inline]] bool within_limits(const TriangleBlock& block, int lane, float t) const {
+    template <class Block>
+    [[gnu::always_inline]] bool within_limits(const Block& block, int lane, float t) const {
         if (t < ray_.given_tmin || t > ray_.given_tmax) return false;
         if (t == ray_.given_tmin) [[unlikely]]
             if (compare_with_limit(ray_.given(), corners_of(block, lane), t) < 0) return false;
@@ -154,14 +153,14 @@ private:
         return true;
     }
 
-    template <class Query>
-    [[gnu::always_inline]] bool offer(const TriangleBlock& block, int lane, const HitNumbers& hit, Query& query) const {
+    template <class Block, class Query>
+    [[gnu::always_inline]] bool offer(const Block& block, int lane, const HitNumbers& hit, Query& query) const {
         if constexpr (Query::in_order)
-            return query.take(hit, block, lane, ray_.unscale, [&](const TriangleBlock& other, int other_lane) {
+            return query.take(hit, block, lane, ray_.unscale, [&](const Block& other, int other_lane) {
                 return compare_distances(ray_.given(), corners_of(block, lane), corners_of(other, other_lane));
             });
         else
-            return query.take(hit.t, hit.u, hit.v, static_cast<std::uint32_t>(block.prim[lane]));
+            return query.take(hit.t, hit.u, hit.v, static_cast<std::uint32_t>(block.prim_at(lane)));
     }
 
     const Frame& ray_;

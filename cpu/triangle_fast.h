@@ -21,19 +21,23 @@ public:
     }
 
     // Offers every hit of the block to the query; true once the query is done.
-    template <class Query>
-    [[gnu::always_inline]] bool test(const TriangleBlock& block, Query& query) const {
-        const auto row = [&](int k, int axis) { return Float4::load(block.rows[3 * k + axis]); };
-        const Float4 e1[3] = {row(1, 0), row(1, 1), row(1, 2)}, e2[3] = {row(2, 0), row(2, 1), row(2, 2)};
-        Float4 p[3], s[3], q[3];
+    template <class Corners, class Query>
+    [[gnu::always_inline]] bool test(const Corners& corners, Query& query) const {
+        Float4 e1[3], e2[3], p[3], s[3], q[3];
+        for (unsigned axis = 0; axis < 3; ++axis) {
+            const Float4 v0 = corners.vertex(0, axis);
+            e1[axis] = corners.edge(1, axis, v0);
+            e2[axis] = corners.edge(2, axis, v0);
+            s[axis] = origin_[axis] - v0;
+        }
         cross(direction_, e2, p);
-        for (int axis = 0; axis < 3; ++axis) s[axis] = origin_[axis] - row(0, axis);
         cross(s, e1, q);
         const Float4 det = dot(e1, p), size = abs(det), zero = Float4::all(0.0f);
         const Float4 u = flip_sign(dot(s, p), det), v = flip_sign(dot(direction_, q), det);
         // A determinant of zero (a ray in the triangle's plane) fails, and so does NaN (an unused lane): where u is
         // NaN and v is not, min gives v, but the sum is NaN.
         unsigned lanes = all_in_order(zero, min(u, v), u + v, size, zero, size);
+        lanes = corners.used(lanes);
         if (lanes == 0) [[likely]] return false;
         alignas(16) float ts[4], us[4], vs[4];
         for (Float4& component : q) component = component / size;  // first: the product of three lengths may overflow
@@ -42,7 +46,7 @@ public:
         (v / size).store(vs);
         for (; lanes != 0; lanes &= lanes - 1) {
             const int lane = __builtin_ctz(lanes);
-            if (query.offer(ts[lane], us[lane], vs[lane], static_cast<std::uint32_t>(block.prim[lane]))) return true;
+            if (query.offer(ts[lane], us[lane], vs[lane], static_cast<std::uint32_t>(corners.block.prim_at(lane)))) return true;
         }
         return false;
     }

@@ -41,33 +41,31 @@ public:
     }
 
     // Offers every hit of the block to the query; true once the query is done.
-    template <class Query>
-    [[gnu::always_inline]] bool test(const TriangleBlock& block, Query& query) const {
+    template <class Corners, class Query>
+    [[gnu::always_inline]] bool test(const Corners& corners, Query& query) const {
         Float4 x[3], y[3];
         const Float4 shear_x = Float4::all(shear_[0]), shear_y = Float4::all(shear_[1]);
-        const float *row_x = block.rows[axis_[0]], *row_y = block.rows[axis_[1]], *row_z = block.rows[axis_[2]];
-        for (int k = 0; k < 3; ++k) {
-            const int vertex = 3 * block_width * k;
-            const Float4 z = Float4::load(row_z + vertex) - origin_[2];
-            x[k] = (Float4::load(row_x + vertex) - origin_[0]) - shear_x * z;
-            y[k] = (Float4::load(row_y + vertex) - origin_[1]) - shear_y * z;
+        for (unsigned k = 0; k < 3; ++k) {
+            const Float4 z = corners.vertex(k, axis_[2]) - origin_[2];
+            x[k] = (corners.vertex(k, axis_[0]) - origin_[0]) - shear_x * z;
+            y[k] = (corners.vertex(k, axis_[1]) - origin_[1]) - shear_y * z;
         }
         const Float4 u = x[2] * y[1] - y[2] * x[1];
         const Float4 v = x[0] * y[2] - y[0] * x[2];
         const Float4 w = x[1] * y[0] - y[1] * x[0];
         const Float4 low = min(min(u, v), w), high = max(max(u, v), w), zero = Float4::all(0.0f);
-        unsigned lanes = one_sided(low, high);
+        unsigned lanes = corners.used(one_sided(low, high));
         if (lanes == 0) [[likely]] return false;
 
         Float4 side = low + zero;  // negative where the edge functions are; adding zero clears the sign of -0
         if (const unsigned ties = lanes & (equal(u, zero) | equal(v, zero) | equal(w, zero)); ties != 0) [[unlikely]]
-            lanes = settle_ties(block, lanes, ties, side);
+            lanes = settle_ties(corners.block, lanes, ties, side);
 
         alignas(16) float ts[4], us[4], vs[4];
-        intersect(block, lanes, side, ts, us, vs);
+        intersect(corners, lanes, side, ts, us, vs);
         for (; lanes != 0; lanes &= lanes - 1) {
             const int lane = __builtin_ctz(lanes);
-            if (query.offer(ts[lane], us[lane], vs[lane], static_cast<std::uint32_t>(block.prim[lane]))) return true;
+            if (query.offer(ts[lane], us[lane], vs[lane], static_cast<std::uint32_t>(corners.block.prim_at(lane)))) return true;
         }
         return false;
     }
@@ -76,15 +74,14 @@ private:
     // t, u and v in double, rounded once. The plane across the ray is scaled by the direction's longest component,
     // which spares the divisions. Where only the rounding of the corners let the ray in, a weight is on the wrong side
     // here: there the rounded triangle is what is hit, and t lies where its boxes are looked for.
-    [[gnu::always_inline]] void intersect(const TriangleBlock& block, unsigned lanes, Float4 side, float (&ts)[4],
+    template <class Corners>
+    [[gnu::always_inline]] void intersect(const Corners& corners, unsigned lanes, Float4 side, float (&ts)[4],
                                           float (&us)[4], float (&vs)[4]) const {
         const Double4 forward = Double4::all(ray_.direction[axis_[2]]);
         const Double4 shear_x = Double4::all(ray_.direction[axis_[0]]), shear_y = Double4::all(ray_.direction[axis_[1]]);
         Double4 x[3], y[3], z[3], weight[3];
-        for (int k = 0; k < 3; ++k) {
-            const auto away = [&](int i) {
-                return widen(Float4::load(block.rows[axis_[i]] + 3 * block_width * k)) - widen(origin_[i]);
-            };
+        for (unsigned k = 0; k < 3; ++k) {
+            const auto away = [&](int i) { return widen(corners.vertex(k, axis_[i])) - widen(origin_[i]); };
             z[k] = away(2);
             x[k] = away(0) * forward - shear_x * z[k];
             y[k] = away(1) * forward - shear_y * z[k];
@@ -103,11 +100,12 @@ private:
         Float4::narrow(weight[2] * inverse).store(vs);
         const unsigned inside = less_equal(zero, lowest) & ~less_equal(det, zero);
         if (const unsigned rounded = lanes & ~inside; rounded != 0) [[unlikely]]
-            intersect_rounded(block, rounded, ts, us, vs);
+            intersect_rounded(corners.block, rounded, ts, us, vs);
     }
 
     // Decides the lanes in which rounding hid a sign; returns the lanes that remain.
-    [[gnu::noinline]] unsigned settle_ties(const TriangleBlock& block, unsigned lanes, unsigned ties, Float4& side) const {
+    template <class Block>
+    [[gnu::noinline]] unsigned settle_ties(const Block& block, unsigned lanes, unsigned ties, Float4& side) const {
         alignas(16) float sides[4];
         side.store(sides);
         for (; ties != 0; ties &= ties - 1) {
@@ -124,7 +122,8 @@ private:
     }
 
     // The same for the triangle with rounded corners.
-    [[gnu::noinline]] void intersect_rounded(const TriangleBlock& block, unsigned lanes, float (&ts)[4], float (&us)[4],
+    template <class Block>
+    [[gnu::noinline]] void intersect_rounded(const Block& block, unsigned lanes, float (&ts)[4], float (&us)[4],
                                              float (&vs)[4]) const {
         for (; lanes != 0; lanes &= lanes - 1) {
             const int lane = __builtin_ctz(lanes);
@@ -139,10 +138,13 @@ private:
     }
 
     // The edge functions of one lane's rounded corners, with exact signs, and the corners' depths.
-    [[gnu::noinline]] void exact_edges(const TriangleBlock& block, int lane, double (&edges)[3], double (&depth)[3]) const {
+    template <class Block>
+    [[gnu::noinline]] void exact_edges(const Block& block, int lane, double (&edges)[3], double (&depth)[3]) const {
         double x[3], y[3];
         for (int k = 0; k < 3; ++k) {
-            const auto away = [&](std::size_t i) { return block.rows[3 * k + static_cast<int>(axis_[i])][lane] - ray_.origin[axis_[i]]; };
+            const auto away = [&](std::size_t i) {
+                return block.vertex(k, static_cast<int>(axis_[i]), lane) - ray_.origin[axis_[i]];
+            };
             const float z = away(2);
             const float shifted_x = away(0) - shear_[0] * z, shifted_y = away(1) - shear_[1] * z;
             x[k] = shifted_x;

@@ -124,9 +124,9 @@ def test_a_vertex_that_is_no_place_is_named_by_its_index(value, dtype):
             "accuracy must be one of fast, watertight in this version of wive, got 'exact'",
         ),
         (
-            {"nodes": "compressed"},
+            {"nodes": "small"},
             ValueError,
-            "nodes must be one of float32 in this version of wive, got 'compressed'",
+            "nodes must be one of float32, compressed in this version of wive, got 'small'",
         ),
         (
             {"device": "cuda:0", "backend": "scalar"},

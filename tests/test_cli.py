@@ -108,6 +108,16 @@ def test_info_describes_mesh_and_tree(ball, capsys):
     assert lines["memory"].endswith("a triangle)")
 
 
+def test_info_tells_how_nodes_are_stored(ball, capsys):
+    sizes = []
+    for nodes in ("float32", "compressed"):
+        assert run("info", ball, "--nodes", nodes) == 0
+        lines = dict(line.split(maxsplit=1) for line in capsys.readouterr().out.splitlines())
+        assert lines["form"] == f"{nodes} nodes"
+        sizes.append(int(lines["memory"].split()[0].replace(",", "")))
+    assert sizes[1] < 0.65 * sizes[0]
+
+
 def test_backends_lists_each_with_its_reason(capsys):
     assert run("backends") == 0
     lines = capsys.readouterr().out.splitlines()

@@ -44,6 +44,13 @@ REGISTERS = {
     ("fast", 1): 72,
     ("watertight", 1): 96,
 }
+# The same of compressed nodes: unpacking takes a few.
+COMPRESSED_REGISTERS = {
+    ("fast", 8): 96,
+    ("watertight", 8): 112,
+    ("fast", 1): 80,
+    ("watertight", 1): 96,
+}
 # Bytes: a thread that owns its stack holds a child and, for the closest hit, a distance an entry, and up to
 # eleven words of the ray behind them. A group's stack is in shared memory.
 STACK_BYTES = {
@@ -133,6 +140,21 @@ def test_kernel_compiles_for_cuda_within_its_limits(
     assert usage.spills == 0
     assert usage.stack <= (STACK_BYTES[query] if lanes == 8 else 0)
     assert usage.registers <= REGISTERS[accuracy, lanes]
+
+
+@pytest.mark.timeout(120)
+@pytest.mark.parametrize("lanes", [8, 1])
+@pytest.mark.parametrize("accuracy", ["fast", "watertight"])
+@pytest.mark.parametrize("query", KERNELS)
+def test_kernel_for_compressed_nodes_compiles_within_its_limits(
+    query: str, accuracy: str, lanes: int, tmp_path: Path
+) -> None:
+    kernel = KERNELS[query](accuracy, lanes, STACK, False, "compressed")
+    kernel.module.options["block_dim"] = default_block_dim(lanes)
+    usage = assemble(compiled_ptx(kernel.module, 90, tmp_path), 90, tmp_path)
+    assert usage.spills == 0
+    assert usage.stack <= STACK_BYTES[query, lanes]
+    assert usage.registers <= COMPRESSED_REGISTERS[accuracy, lanes]
 
 
 @pytest.mark.timeout(120)

@@ -118,6 +118,14 @@ def test_handle_of_the_wrong_accuracy_is_an_error_and_misses() -> None:
         warp_kernels.check(tree)
 
 
+def test_handle_of_a_compressed_tree_is_an_error_and_misses() -> None:
+    tree = warp_kernels.upload(_cpu.Bvh(*soup(100, 1), nodes="compressed"), "cpu")
+    found = trace(trace_watertight, tree, random_rays(50, 2))
+    assert (found.prim == -1).all() and not found.occluded.any()
+    with pytest.raises(warp_kernels.CorruptTreeError, match="take trees with nodes 'float32'"):
+        warp_kernels.check(tree)
+
+
 def test_tree_too_deep_for_the_functions_is_an_error_and_misses() -> None:
     tree = warp_kernels.upload(_cpu.Bvh(*soup(100, 1)), "cpu")
     tree.handle.stack = 129

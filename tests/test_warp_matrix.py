@@ -17,6 +17,7 @@ pytestmark = pytest.mark.timeout(120)
 HITS = ("t", "prim", "uv", "occluded", "counts", "offsets", "all_t", "all_prim", "all_uv")
 CPU_KERNELS = [name for name, reason in _cpu.kernels().items() if not reason and "." not in name]
 ACCURACIES = ("fast", "watertight")
+FORMS = ("float32", "compressed")
 Mesh = tuple[np.ndarray, np.ndarray]
 
 
@@ -28,13 +29,18 @@ def inside(vertices: np.ndarray, count: int, seed: int) -> Mesh:
 
 
 @pytest.mark.parametrize("accuracy", ACCURACIES)
-@pytest.mark.parametrize("scene", ["staircase", "living_room"])
+@pytest.mark.parametrize(
+    ("scene", "nodes"), [("staircase", "float32"), ("living_room", "float32"), ("living_room", "compressed")]
+)
 def test_every_backend_gives_the_same_bits_on_real_scenes(
-    scene: str, accuracy: str, scenes: Callable[[str], Mesh]
+    scene: str, nodes: str, accuracy: str, scenes: Callable[[str], Mesh]
 ) -> None:
     vertices, faces = scenes(scene)
     bvh = _cpu.Bvh(
-        np.ascontiguousarray(vertices, np.float32), np.ascontiguousarray(faces, np.int32), accuracy
+        np.ascontiguousarray(vertices, np.float32),
+        np.ascontiguousarray(faces, np.int32),
+        accuracy,
+        nodes=nodes,
     )
     origins, directions = inside(vertices, 20_000, 1)
     reference = cpu_answers(bvh, "scalar", origins, directions)
@@ -47,10 +53,11 @@ def test_every_backend_gives_the_same_bits_on_real_scenes(
     assert_bit_identical(one_lane, cpu_answers(bvh, "scalar", origins[few], directions[few]))
 
 
+@pytest.mark.parametrize("nodes", FORMS)
 @pytest.mark.parametrize("accuracy", ACCURACIES)
 @pytest.mark.parametrize("count", [1, 3, 13, 101])
-def test_partial_blocks_answer_as_full_ones(count: int, accuracy: str) -> None:
-    bvh = _cpu.Bvh(*soup(3000, 2), accuracy)
+def test_partial_blocks_answer_as_full_ones(count: int, accuracy: str, nodes: str) -> None:
+    bvh = _cpu.Bvh(*soup(3000, 2), accuracy, nodes=nodes)
     origins, directions = random_rays(count, 3)
     reference = cpu_answers(bvh, "scalar", origins, directions)
     for lanes in (8, 1):
@@ -123,11 +130,12 @@ def grid(side: int) -> Mesh:
     return vertices, faces.astype(np.int32)
 
 
+@pytest.mark.parametrize("nodes", FORMS)
 @pytest.mark.parametrize("accuracy", ACCURACIES)
 @pytest.mark.parametrize("mesh", HARD_MESHES)
-def test_hard_rays_give_the_same_bits_in_every_form(mesh: str, accuracy: str) -> None:
+def test_hard_rays_give_the_same_bits_in_every_form(mesh: str, accuracy: str, nodes: str) -> None:
     vertices, faces = HARD_MESHES[mesh]()
-    bvh = _cpu.Bvh(vertices, faces, accuracy)
+    bvh = _cpu.Bvh(vertices, faces, accuracy, nodes=nodes)
     origins, directions = hard_rays(vertices, faces) if len(faces) else random_rays(50, 8)
     tmin = np.full(1, -np.inf, np.float32)  # behind the origin, too: t of either sign
     reference = cpu_answers(bvh, "scalar", origins, directions, tmin)

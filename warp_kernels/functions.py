@@ -10,7 +10,7 @@ called.
 import warp as wp
 
 from wive.warp_kernels.frame import load_frame
-from wive.warp_kernels.handle import NO_PRIM, STACK_TOO_SMALL, WRONG_ACCURACY, Bvh, FastBvh, Hit
+from wive.warp_kernels.handle import COMPRESSED, NO_PRIM, STACK_TOO_SMALL, WRONG_ACCURACY, Bvh, FastBvh, Hit
 from wive.warp_kernels.traversal import make_traversal
 
 # A tree of 2.7 million triangles asks for less than 100 entries; deeper ones are refused by the error flag.
@@ -25,13 +25,15 @@ _count_fast = make_traversal("count", "fast", 8, STACK, False)
 
 
 @wp.func
-def _refused(error: wp.array(dtype=wp.int32), stack: int, wrong_accuracy: bool):
+def _refused(error: wp.array(dtype=wp.int32), stack: int, wrong_accuracy: bool, compressed: int):
     """Whether the tree can't be traversed here; says why in the error flag."""
     reason = int(0)  # noqa: RUF046, UP018
     if stack > STACK:
         reason = wp.static(STACK_TOO_SMALL)
     if wrong_accuracy:
         reason = wp.static(WRONG_ACCURACY)
+    if compressed != 0:
+        reason = wp.static(COMPRESSED)
     if reason != 0:
         error[0] = reason
     return reason != 0 or error[0] != 0
@@ -56,7 +58,7 @@ def closest_hit(bvh: Bvh, origin: wp.vec3, direction: wp.vec3, tmin: float, tmax
     """
     hit = _miss()
     ray = load_frame(bvh.center, bvh.extent, origin, direction, tmin, tmax)
-    if ray.valid and not _refused(bvh.error, bvh.stack, bvh.watertight == 0):
+    if ray.valid and not _refused(bvh.error, bvh.stack, bvh.watertight == 0, bvh.compressed):
         best = _closest_watertight(bvh, ray, 0).best
         if best.prim != wp.static(NO_PRIM):
             hit.t = best.t * ray.scale
@@ -71,7 +73,7 @@ def closest_hit(bvh: FastBvh, origin: wp.vec3, direction: wp.vec3, tmin: float, 
     """The closest hit in a fast tree."""
     hit = _miss()
     ray = load_frame(bvh.center, bvh.extent, origin, direction, tmin, tmax)
-    if ray.valid and not _refused(bvh.error, bvh.stack, bvh.watertight != 0):
+    if ray.valid and not _refused(bvh.error, bvh.stack, bvh.watertight != 0, bvh.compressed):
         best = _closest_fast(bvh, ray, 0).best
         if best.prim != wp.static(NO_PRIM):
             hit.t = best.t * ray.scale
@@ -89,7 +91,7 @@ def any_hit(bvh: Bvh, origin: wp.vec3, direction: wp.vec3, tmin: float, tmax: fl
     """
     ray = load_frame(bvh.center, bvh.extent, origin, direction, tmin, tmax)
     hit = bool(False)  # noqa: UP018
-    if ray.valid and not _refused(bvh.error, bvh.stack, bvh.watertight == 0):
+    if ray.valid and not _refused(bvh.error, bvh.stack, bvh.watertight == 0, bvh.compressed):
         hit = _any_watertight(bvh, ray, 0).best.prim != wp.static(NO_PRIM)
     return hit
 
@@ -99,7 +101,7 @@ def any_hit(bvh: FastBvh, origin: wp.vec3, direction: wp.vec3, tmin: float, tmax
     """Whether anything lies in the way in a fast tree."""
     ray = load_frame(bvh.center, bvh.extent, origin, direction, tmin, tmax)
     hit = bool(False)  # noqa: UP018
-    if ray.valid and not _refused(bvh.error, bvh.stack, bvh.watertight != 0):
+    if ray.valid and not _refused(bvh.error, bvh.stack, bvh.watertight != 0, bvh.compressed):
         hit = _any_fast(bvh, ray, 0).best.prim != wp.static(NO_PRIM)
     return hit
 
@@ -112,7 +114,7 @@ def count_hits(bvh: Bvh, origin: wp.vec3, direction: wp.vec3, tmin: float, tmax:
     """
     ray = load_frame(bvh.center, bvh.extent, origin, direction, tmin, tmax)
     count = int(0)  # noqa: RUF046, UP018
-    if ray.valid and not _refused(bvh.error, bvh.stack, bvh.watertight == 0):
+    if ray.valid and not _refused(bvh.error, bvh.stack, bvh.watertight == 0, bvh.compressed):
         count = _count_watertight(bvh, ray, 0).best.count
     return count
 
@@ -122,7 +124,7 @@ def count_hits(bvh: FastBvh, origin: wp.vec3, direction: wp.vec3, tmin: float, t
     """How many triangles the ray meets in a fast tree."""
     ray = load_frame(bvh.center, bvh.extent, origin, direction, tmin, tmax)
     count = int(0)  # noqa: RUF046, UP018
-    if ray.valid and not _refused(bvh.error, bvh.stack, bvh.watertight != 0):
+    if ray.valid and not _refused(bvh.error, bvh.stack, bvh.watertight != 0, bvh.compressed):
         count = _count_fast(bvh, ray, 0).best.count
     return count
 

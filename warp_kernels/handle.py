@@ -11,11 +11,17 @@ import warp as wp
 # where the child begins, because a unit of 32 bytes is eight words and a reference holds the unit times
 # eight.
 NODE_WIDTH = 8
+NODE_WORDS = 64
 BLOCK_WIDTH = 4
 BLOCK_WORDS = 40
 CHILD_ROW = 48
 RANK_ROW = 56  # the order row, inverted by `upload`: lane i holds its own place in each octant's order
 PRIM_ROW = 36
+# cpu/compressed.h, in words: a node, its order lanes of three bytes, its children; the smaller of both blocks
+COMPRESSED_NODE_WORDS = 32
+COMPRESSED_ORDERS = 18
+COMPRESSED_CHILD_ROW = 24
+LEAST_COMPRESSED_WORDS = 24
 WORD_MASK = 0x7FFFFFF8
 END_OF_STACK = -1  # all bits set: a leaf by its sign
 NO_PRIM = -1
@@ -26,6 +32,7 @@ SIGN_BIT = wp.constant(wp.uint32(0x80000000))
 CORRUPT = 1
 STACK_TOO_SMALL = 2
 WRONG_ACCURACY = 3
+COMPRESSED = 4
 
 ACCURACIES = ("fast", "watertight")
 
@@ -41,6 +48,7 @@ class Bvh:
     step_limit: wp.int32  # no traversal of a sound tree takes more steps
     stack: wp.int32  # entries a traversal may need
     watertight: wp.int32
+    compressed: wp.int32
 
 
 @wp.struct
@@ -54,6 +62,7 @@ class FastBvh:
     step_limit: wp.int32
     stack: wp.int32
     watertight: wp.int32
+    compressed: wp.int32
 
 
 @wp.struct

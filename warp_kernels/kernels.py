@@ -1,4 +1,5 @@
-"""The kernels over batches of rays: one for each query, accuracy, lane form, stack size, counters or none."""
+"""The kernels over batches of rays: one for each query, accuracy, lane form, stack size, counters or
+none, and node form."""
 
 # mypy: ignore-errors
 # Warp compiles these functions: to mypy they are no Python.
@@ -24,9 +25,11 @@ def value_of(values: wp.array(dtype=wp.float32), i: int):
 
 
 @functools.cache
-def closest_kernel(accuracy: str, length: int, stack: int, counters: bool = False) -> wp.Kernel:
+def closest_kernel(
+    accuracy: str, length: int, stack: int, counters: bool = False, nodes: str = "float32"
+) -> wp.Kernel:
     """The kernel behind `launch_closest`, of dimensions (n, 8 // length)."""
-    traverse = make_traversal("closest", accuracy, length, stack, counters)
+    traverse = make_traversal("closest", accuracy, length, stack, counters, nodes)
     or_reduce, min_reduce = reductions(length)
     tree_type = HANDLES[accuracy]
 
@@ -74,9 +77,11 @@ def closest_kernel(accuracy: str, length: int, stack: int, counters: bool = Fals
 
 
 @functools.cache
-def any_kernel(accuracy: str, length: int, stack: int, counters: bool = False) -> wp.Kernel:
+def any_kernel(
+    accuracy: str, length: int, stack: int, counters: bool = False, nodes: str = "float32"
+) -> wp.Kernel:
     """The kernel behind `launch_any`, of dimensions (n, 8 // length)."""
-    traverse = make_traversal("any", accuracy, length, stack, counters)
+    traverse = make_traversal("any", accuracy, length, stack, counters, nodes)
     or_reduce, _ = reductions(length)
     tree_type = HANDLES[accuracy]
 

@@ -28,9 +28,11 @@ def address_of_number(left: wp.array(dtype=wp.int32), i: int) -> wp.uint64:
 
 
 @functools.cache
-def count_kernel(accuracy: str, length: int, stack: int, counters: bool = False) -> wp.Kernel:
+def count_kernel(
+    accuracy: str, length: int, stack: int, counters: bool = False, nodes: str = "float32"
+) -> wp.Kernel:
     """The kernel behind `launch_count`, of dimensions (n, 8 // length)."""
-    traverse = make_traversal("count", accuracy, length, stack, counters)
+    traverse = make_traversal("count", accuracy, length, stack, counters, nodes)
     or_reduce, _ = reductions(length)
     add_reduce = sum_reduction(length)
     tree_type = HANDLES[accuracy]
@@ -62,9 +64,9 @@ def count_kernel(accuracy: str, length: int, stack: int, counters: bool = False)
 
 
 @functools.cache
-def all_kernel(accuracy: str, length: int, stack: int) -> wp.Kernel:
+def all_kernel(accuracy: str, length: int, stack: int, nodes: str = "float32") -> wp.Kernel:
     """The kernel that lists the hits behind `launch_all`, of dimensions (n, 8 // length)."""
-    traverse_from = make_traversal_from("all", accuracy, length, stack, False)
+    traverse_from = make_traversal_from("all", accuracy, length, stack, False, nodes)
     or_reduce, _ = reductions(length)
     tree_type = HANDLES[accuracy]
 

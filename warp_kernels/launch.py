@@ -54,7 +54,7 @@ def launch_closest(
         block_dim: threads a block; a multiple of 8 where lanes is 1. None picks one.
         stream: the CUDA stream to launch on; None is the device's current one.
     """
-    kernel = closest_kernel(tree.accuracy, lanes, tree.stack, stats is not None)
+    kernel = closest_kernel(tree.accuracy, lanes, tree.stack, stats is not None, tree.nodes)
     launch(kernel, tree, [origins, directions, tmin, tmax], [t, prim, uv, stats], lanes, block_dim, stream)
 
 
@@ -75,7 +75,7 @@ def launch_any(
 
     The other arguments are those of `launch_closest`.
     """
-    kernel = any_kernel(tree.accuracy, lanes, tree.stack, stats is not None)
+    kernel = any_kernel(tree.accuracy, lanes, tree.stack, stats is not None, tree.nodes)
     launch(kernel, tree, [origins, directions, tmin, tmax], [occluded, stats], lanes, block_dim, stream)
 
 

@@ -33,7 +33,7 @@ def launch_count(
 
     The other arguments are those of `launch_closest`.
     """
-    kernel = count_kernel(tree.accuracy, lanes, tree.stack, stats is not None)
+    kernel = count_kernel(tree.accuracy, lanes, tree.stack, stats is not None, tree.nodes)
     launch(kernel, tree, [origins, directions, tmin, tmax], [counts, stats], lanes, block_dim, stream)
 
 
@@ -76,7 +76,7 @@ def launch_all(
         uv: (h,) vec2.
     """
     hits = wp.empty(len(t), dtype=Hit, device=tree.device)
-    kernel = all_kernel(tree.accuracy, lanes, tree.stack)
+    kernel = all_kernel(tree.accuracy, lanes, tree.stack, tree.nodes)
     launch(kernel, tree, [origins, directions, tmin, tmax], [offsets, counts, hits], lanes, block_dim, stream)
     wp.launch(
         sort_hits,

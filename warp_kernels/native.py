@@ -97,6 +97,87 @@ ROW_1 = """
 #endif
 """
 
+# The same distances where planes are bytes on a grid: byte * (step * rdir) + (origin * rdir + bias). A node
+# begins with origin and step; its rows of eight bytes follow them.
+BYTE_DISTANCES_8 = """
+    const float* words = (const float*)units + node;
+    wp::vec_t<8, wp::float32> distances;
+#if defined(__CUDA_ARCH__)
+    const float step = __fmul_rn(__ldg(words + 3 + axis), rdir);
+    const float base = __fmaf_rn(__ldg(words + axis), rdir, bias);
+    const uint2 bytes = __ldg((const uint2*)(words + 6) + row);
+    for (int i = 0; i < 4; ++i) {
+        distances[i] = __fmaf_rn((float)(bytes.x >> 8 * i & 255u), step, base);
+        distances[4 + i] = __fmaf_rn((float)(bytes.y >> 8 * i & 255u), step, base);
+    }
+#else
+    const float step = words[3 + axis] * rdir, base = words[axis] * rdir + bias;
+    const unsigned char* bytes = (const unsigned char*)(words + 6) + 8 * row;
+    for (int i = 0; i < 8; ++i) distances[i] = (float)bytes[i] * step + base;
+#endif
+    return distances;
+"""
+BYTE_DISTANCES_1 = """
+    const float* words = (const float*)units + node;
+    const unsigned char* byte = (const unsigned char*)(words + 6) + 8 * row + lane;
+#if defined(__CUDA_ARCH__)
+    const float base = __fmaf_rn(__ldg(words + axis), rdir, bias);
+    const float step = __fmul_rn(__ldg(words + 3 + axis), rdir);
+    return wp::vec_t<1, wp::float32>(__fmaf_rn((float)__ldg(byte), step, base));
+#else
+    return wp::vec_t<1, wp::float32>((float)*byte * (words[3 + axis] * rdir) + (words[axis] * rdir + bias));
+#endif
+"""
+
+# Lanes of three bytes, the fourth being whatever comes behind.
+RANKS_8 = """
+    const unsigned* row = (const unsigned*)units + node + 18;
+    wp::vec_t<8, wp::uint32> ranks;
+    for (int half = 0; half < 2; ++half) {
+#if defined(__CUDA_ARCH__)
+        const unsigned a = __ldg(row + 3 * half), b = __ldg(row + 3 * half + 1);
+        const unsigned c = __ldg(row + 3 * half + 2);
+#else
+        const unsigned a = row[3 * half], b = row[3 * half + 1], c = row[3 * half + 2];
+#endif
+        ranks[4 * half] = a;
+        ranks[4 * half + 1] = a >> 24 | b << 8;
+        ranks[4 * half + 2] = b >> 16 | c << 16;
+        ranks[4 * half + 3] = c >> 8;
+    }
+    return ranks;
+"""
+RANKS_1 = """
+    const unsigned char* bytes = (const unsigned char*)((const unsigned*)units + node + 18) + 3 * lane;
+#if defined(__CUDA_ARCH__)
+    return wp::vec_t<1, wp::uint32>(__ldg(bytes) | __ldg(bytes + 1) << 8 | __ldg(bytes + 2) << 16);
+#else
+    return wp::vec_t<1, wp::uint32>(bytes[0] | bytes[1] << 8 | bytes[2] << 16);
+#endif
+"""
+
+# Of a row of shared vertices, those of four triangles, numbered by four bits each, or that of the lane's own.
+PICK_4 = """
+    const float* from = (const float*)units + row;
+    wp::vec_t<4, wp::float32> picked;
+    for (int i = 0; i < 4; ++i) {
+#if defined(__CUDA_ARCH__)
+        picked[i] = __ldg(from + (numbers >> 4 * i & 7u));
+#else
+        picked[i] = from[numbers >> 4 * i & 7u];
+#endif
+    }
+    return picked;
+"""
+PICK_1 = """
+    const float* from = (const float*)units + row + (numbers >> 4 * (lane & 3) & 7u);
+#if defined(__CUDA_ARCH__)
+    return wp::vec_t<1, wp::float32>(__ldg(from));
+#else
+    return wp::vec_t<1, wp::float32>(*from);
+#endif
+"""
+
 # Four triangles' worth of a row of a block, or the lane's own.
 TRIANGLES_4 = """
     const float* row = (const float*)units + at;

@@ -7,15 +7,19 @@ from types import SimpleNamespace
 import warp as wp
 
 from wive.warp_kernels.frame import RayFrame
-from wive.warp_kernels.handle import CHILD_ROW, RANK_ROW
 from wive.warp_kernels.lanes import without_gradient
 
 
-def make_visit(lanes: SimpleNamespace, entries: int, in_order: bool) -> wp.Function:
-    """The visit for these lanes; entries: what the stack holds; in_order: whether the nearest goes on top."""
+def make_visit(lanes: SimpleNamespace, form: SimpleNamespace, entries: int, in_order: bool) -> wp.Function:
+    """The visit for these lanes and form of nodes.
+
+    entries: what the stack holds; in_order: whether the nearest goes on top.
+    """
     length = lanes.length
     vector = lanes.vector
-    plane_distances = lanes.plane_distances
+    distances, load_ranks, has_child = form.distances, form.ranks, form.has_child
+    child_row: int = form.child_row
+    rank_bits: int = form.rank_bits
     load_row = lanes.load_row
     or_reduce = lanes.or_reduce
     stack_argument = lanes.stack_argument
@@ -41,28 +45,29 @@ def make_visit(lanes: SimpleNamespace, entries: int, in_order: bool) -> wp.Funct
     ):
         """Store at `top` the children met within [tmin, tmax], the nearest last; return how many."""
         # (A) order: octant 7 - o is octant o backwards, and the stack wants the farthest child first.
-        shift = wp.uint32(4 * (7 - ray.octant))
-        ranks = load_row(units, node + wp.static(RANK_ROW), lane)
-        children = load_row(units, node + wp.static(CHILD_ROW), lane)
+        shift = wp.uint32(rank_bits * (7 - ray.octant))
+        ranks = load_ranks(units, node, lane)
+        children = load_row(units, node + child_row, lane)
         # (B) slabs
-        x = 8 * (ray.octant & 1)
-        y = 8 * ((ray.octant >> 1) & 1)
-        z = 8 * (ray.octant >> 2)
+        x = ray.octant & 1
+        y = (ray.octant >> 1) & 1
+        z = ray.octant >> 2
         r = ray.rdir
         b = ray.near_bias
-        near_x = plane_distances(units, node + x, lane, r[0], b[0])
-        near_y = plane_distances(units, node + 16 + y, lane, r[1], b[1])
-        near_z = plane_distances(units, node + 32 + z, lane, r[2], b[2])
+        near_x = distances(units, node, lane, 0, x, r[0], b[0])
+        near_y = distances(units, node, lane, 1, 2 + y, r[1], b[1])
+        near_z = distances(units, node, lane, 2, 4 + z, r[2], b[2])
         b = ray.far_bias
-        far_x = plane_distances(units, node + 8 - x, lane, r[0], b[0])
-        far_y = plane_distances(units, node + 24 - y, lane, r[1], b[1])
-        far_z = plane_distances(units, node + 40 - z, lane, r[2], b[2])
+        far_x = distances(units, node, lane, 0, 1 - x, r[0], b[0])
+        far_y = distances(units, node, lane, 1, 3 - y, r[1], b[1])
+        far_z = distances(units, node, lane, 2, 5 - z, r[2], b[2])
         tnear = wp.max(wp.max(near_x, near_y), wp.max(near_z, vector(ray.tmin)))
         tfar = wp.min(wp.min(far_x, far_y), wp.min(far_z, vector(tmax)))
         # (C) permute and compress: every lane's place, the hits among them, and how many hits lie below each
         own = wp.uint32(0)
         for i in range(length):
-            own = own | wp.where(tnear[i] <= tfar[i], place_of(ranks[i], shift, lane + i), wp.uint32(0))
+            met = tnear[i] <= tfar[i] and has_child(children[i])
+            own = own | wp.where(met, place_of(ranks[i], shift, lane + i), wp.uint32(0))
         hits = or_reduce(own)
         # (D) store
         for i in range(length):

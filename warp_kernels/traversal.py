@@ -13,20 +13,22 @@ from types import SimpleNamespace
 import warp as wp
 
 from wive.warp_kernels import triangle_fast, triangle_watertight
+from wive.warp_kernels.blocks import BLOCKS
 from wive.warp_kernels.frame import RayFrame, is_negative
 from wive.warp_kernels.handle import (
     ALL_BITS,
     BLOCK_WIDTH,
-    BLOCK_WORDS,
+    COMPRESSED_NODE_WORDS,
     CORRUPT,
     END_OF_STACK,
     HANDLES,
     NODE_WIDTH,
-    PRIM_ROW,
+    NODE_WORDS,
     SIGN_BIT,
     WORD_MASK,
 )
 from wive.warp_kernels.lanes import address_of, lanes_of, load_float, lowest_lane, without_gradient
+from wive.warp_kernels.nodes import NODES
 from wive.warp_kernels.query import QUERIES, Best
 from wive.warp_kernels.query_all import Crossings
 from wive.warp_kernels.slabs import make_visit
@@ -74,9 +76,14 @@ def unsortable(key: wp.uint32):
 
 
 @functools.cache
-def make_traversal(query: str, accuracy: str, length: int, entries: int, counters: bool) -> wp.Function:
-    """The traversal for one query, accuracy and lane form; that many stack entries must do for the tree."""
-    traverse_from = make_traversal_from(query, accuracy, length, entries, counters)
+def make_traversal(
+    query: str, accuracy: str, length: int, entries: int, counters: bool, nodes: str = "float32"
+) -> wp.Function:
+    """The traversal for one query, accuracy, lane form and node form.
+
+    That many stack entries must do for the tree.
+    """
+    traverse_from = make_traversal_from(query, accuracy, length, entries, counters, nodes)
     begin, tree_type, state_type = QUERIES[query].begin, HANDLES[accuracy], STATES[QUERIES[query].state]
 
     @without_gradient
@@ -88,15 +95,21 @@ def make_traversal(query: str, accuracy: str, length: int, entries: int, counter
 
 
 @functools.cache
-def make_traversal_from(query: str, accuracy: str, length: int, entries: int, counters: bool) -> wp.Function:
+def make_traversal_from(
+    query: str, accuracy: str, length: int, entries: int, counters: bool, nodes: str = "float32"
+) -> wp.Function:
     """The same, beginning with what its last argument holds."""
     asked = QUERIES[query]
     in_order: bool = asked.in_order
     make_triangles, kept_words = TRIANGLES[accuracy]
     lanes = lanes_of(length, entries, in_order, kept_words)
-    triangles = make_triangles(lanes, entries * (2 if in_order else 1))
-    visit = make_visit(lanes, entries, in_order)
-    test_leaf = make_leaf_test(asked, lanes, triangles)
+    blocks_form = BLOCKS[nodes](lanes)
+    triangles = make_triangles(lanes, blocks_form, entries * (2 if in_order else 1))
+    visit = make_visit(lanes, NODES[nodes](lanes), entries, in_order)
+    test_leaf = make_leaf_test(asked, lanes, blocks_form, triangles)
+    count_triangles = make_count(blocks_form)
+    node_words: int = NODE_WORDS if nodes == "float32" else COMPRESSED_NODE_WORDS
+    block_words: int = blocks_form.least_words
     tree_type, best_type, state_type = HANDLES[accuracy], asked.state, STATES[asked.state]
     one_is_enough: bool = asked.one_is_enough
     done = asked.done
@@ -129,9 +142,7 @@ def make_traversal_from(query: str, accuracy: str, length: int, entries: int, co
             begin = child & wp.static(WORD_MASK)
             inner = child >= 0
             blocks = (child & 7) + 1
-            end = wp.uint32(begin) + wp.uint32(
-                wp.where(inner, wp.static(8 * NODE_WIDTH), blocks * wp.static(BLOCK_WORDS))
-            )
+            end = wp.uint32(begin) + wp.uint32(wp.where(inner, node_words, blocks * block_words))
             steps += 1
             if steps > tree.step_limit or top > wp.static(entries - NODE_WIDTH) or end > words:
                 tree.error[0] = wp.static(CORRUPT)
@@ -166,15 +177,22 @@ def make_traversal_from(query: str, accuracy: str, length: int, entries: int, co
     return traverse_from
 
 
-@wp.func
-def count_triangles(units: wp.uint64, begin: int, blocks: int):
-    """How many triangles the blocks hold."""
-    count = int(0)  # noqa: RUF046, UP018
-    for i in range(blocks * wp.static(BLOCK_WIDTH)):
-        at = begin + (i // wp.static(BLOCK_WIDTH)) * wp.static(BLOCK_WORDS) + wp.static(PRIM_ROW)
-        if wp.cast(load_float(units, at + i % wp.static(BLOCK_WIDTH)), wp.int32) >= 0:
-            count += 1
-    return count
+def make_count(form: SimpleNamespace) -> wp.Function:
+    """The count of the triangles that blocks of this form hold."""
+    prim_at, block_at = form.prim_at, form.block_at
+
+    @without_gradient
+    @wp.func
+    def count_triangles(units: wp.uint64, begin: int, blocks: int):
+        count = int(0)  # noqa: RUF046, UP018
+        for i in range(blocks):
+            block = block_at(units, begin, i)
+            for j in range(wp.static(BLOCK_WIDTH)):
+                if wp.cast(load_float(units, prim_at(units, block, j)), wp.int32) >= 0:
+                    count += 1
+        return count
+
+    return count_triangles
 
 
 @wp.struct
@@ -198,12 +216,15 @@ STATES = {Best: Traversal, Crossings: Crossed}
 LEAVES = {Best: TestedLeaf, Crossings: CrossedLeaf}
 
 
-def make_leaf_test(asked: SimpleNamespace, lanes: SimpleNamespace, triangles: SimpleNamespace) -> wp.Function:
+def make_leaf_test(
+    asked: SimpleNamespace, lanes: SimpleNamespace, form: SimpleNamespace, triangles: SimpleNamespace
+) -> wp.Function:
     """The test of a leaf's blocks: one thread takes all, or eight a triangle each of two blocks at a time."""
     stack_argument = lanes.stack_argument
     candidates, solve = triangles.candidates, triangles.solve
     offer, done = asked.offer, asked.done
     best_type, leaf_type = asked.state, LEAVES[asked.state]
+    prim_at, block_at = form.prim_at, form.block_at
     length: int = lanes.triangles_length
     block_step: int = lanes.block_step
 
@@ -223,16 +244,16 @@ def make_leaf_test(asked: SimpleNamespace, lanes: SimpleNamespace, triangles: Si
         leaf.last = 7
         i = int(lane // wp.static(BLOCK_WIDTH))
         while i < blocks:
-            block = begin + i * wp.static(BLOCK_WORDS)
+            block = block_at(units, begin, i)
             found = candidates(units, block, lane, stack)
             left = wp.uint32(found[0])
             while left != wp.uint32(0):
                 j = lowest_lane(left)
                 negative = ((found[1] >> wp.uint32(j)) & wp.uint32(1)) != wp.uint32(0)
                 left = left & (left - wp.uint32(1))
-                at = block + wp.where(length == 1, lane & 3, j)
-                prim = wp.cast(load_float(units, at + wp.static(PRIM_ROW)), wp.int32)
-                leaf.best = offer(leaf.best, tmin, solve(units, at, stack, negative), prim)
+                triangle = wp.where(length == 1, lane & 3, j)
+                prim = wp.cast(load_float(units, prim_at(units, block, triangle)), wp.int32)
+                leaf.best = offer(leaf.best, tmin, solve(units, block, triangle, stack, negative), prim)
             if done(leaf.best):
                 leaf.last = i
                 break

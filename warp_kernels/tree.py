@@ -9,15 +9,19 @@ from numpy.typing import NDArray
 
 from wive import _cpu
 from wive.warp_kernels.handle import (
+    COMPRESSED,
+    COMPRESSED_NODE_WORDS,
     CORRUPT,
     HANDLES,
+    LEAST_COMPRESSED_WORDS,
     NODE_WIDTH,
+    NODE_WORDS,
     STACK_TOO_SMALL,
     WORD_MASK,
     WRONG_ACCURACY,
 )
 from wive.warp_kernels.quiet import hush
-from wive.warp_kernels.ranks import invert_orders
+from wive.warp_kernels.ranks import INVERT_ORDERS
 
 MAX_DEPTH = 64  # cpu/layout.h
 STACK_SIZES = (32, 64, 96, 128, 256, 512)  # kernels are compiled for the least that a tree can do with
@@ -26,6 +30,7 @@ _REASONS = {
     CORRUPT: "a traversal left the tree or did not end: the tree's memory was overwritten",
     STACK_TOO_SMALL: "the tree is too deep for closest_hit and any_hit; use launch_closest and launch_any",
     WRONG_ACCURACY: "a fast tree's handle was given to a kernel that takes Bvh, or the other way round",
+    COMPRESSED: "closest_hit and any_hit take trees with nodes 'float32'; use launch_closest and launch_any",
 }
 
 
@@ -38,7 +43,8 @@ class Tree:
     """A tree on a Warp device, made by `upload`.
 
     `handle` is what kernels take: a `Bvh`, or a `FastBvh` where accuracy is "fast". `stack` is the number of
-    stack entries its kernels are compiled for. `memory` counts bytes on the device.
+    stack entries its kernels are compiled for, `nodes` is "float32" or "compressed". `memory` counts bytes on
+    the device.
     """
 
     device: wp.Device
@@ -47,6 +53,7 @@ class Tree:
     units: wp.array[Any]
     error: wp.array[Any]
     stack: int
+    nodes: str = "float32"
 
     @property
     def memory(self) -> int:
@@ -66,20 +73,36 @@ def upload(bvh: _cpu.Bvh, device: wp.DeviceLike = None) -> Tree:
     units: wp.array[Any] = wp.array(bvh.units.reshape(-1).view(np.float32), dtype=wp.float32, device=place)
     error = wp.zeros(1, dtype=wp.int32, device=place)
     needed = stack_entries(nodes)
-    wp.launch(invert_orders, dim=len(nodes), inputs=[units], device=place, block_dim=128, record_tape=False)
+    wp.launch(
+        INVERT_ORDERS[bvh.node_form],
+        dim=len(nodes),
+        inputs=[units],
+        device=place,
+        block_dim=128,
+        record_tape=False,
+    )
 
     handle = HANDLES[bvh.accuracy]()
     handle.units = units
     handle.error = error
     handle.center = wp.vec3(*bvh.center.tolist())
     handle.extent = wp.vec3(*bvh.extent.tolist())
-    handle.step_limit = (
-        len(bvh.units) // 5 + 1
-    )  # a node is eight units, a leaf at least five, and none is met twice
+    compressed = bvh.node_form == "compressed"
+    # In units, a node is larger than the least leaf, and none is met twice.
+    handle.step_limit = len(bvh.units) // (LEAST_COMPRESSED_WORDS // 8 if compressed else 5) + 1
     handle.stack = needed
     handle.watertight = int(bvh.accuracy == "watertight")
+    handle.compressed = int(compressed)
     stack = next(size for size in STACK_SIZES if size >= needed)
-    return Tree(device=place, accuracy=bvh.accuracy, handle=handle, units=units, error=error, stack=stack)
+    return Tree(
+        device=place,
+        accuracy=bvh.accuracy,
+        handle=handle,
+        units=units,
+        error=error,
+        stack=stack,
+        nodes=bvh.node_form,
+    )
 
 
 def check(tree: Tree) -> None:
@@ -90,21 +113,29 @@ def check(tree: Tree) -> None:
 
 
 def stack_entries(nodes: NDArray[np.uint32]) -> int:
-    """The most entries that a traversal of nodes (m,8,8) can have on its stack, and room for eight more.
+    """The most entries that a traversal can have on its stack, and room for eight more.
+
+    nodes: (m,8,8), or (m,4,8) compressed.
 
     A visit pushes at most all children, of which one is taken before the next visit. Below them is the entry
     that ends the traversal.
     """
-    planes = nodes.view(np.float32)
+    if nodes.shape[1] == 8:
+        children, planes = nodes[:, 6], nodes.view(np.float32)
+        used = planes[:, 0] <= planes[:, 1]
+    else:
+        children = nodes[:, 3]
+        used = children != 0xFFFFFFFF
+    node_words = NODE_WORDS if nodes.shape[1] == 8 else COMPRESSED_NODE_WORDS
     level, held, most = np.zeros(1, np.int64), np.zeros(1, np.int64), 0
     for _ in range(MAX_DEPTH):
-        filled = planes[level, 0] <= planes[level, 1]
+        filled = used[level]
         held = held + filled.sum(axis=1)
         most = max(most, int(held.max()))
-        child = nodes[level, 6]
+        child = children[level]
         inner = filled & (child >> 31 == 0)
         held = np.repeat(held - 1, inner.sum(axis=1))
-        level = (child[inner] & WORD_MASK).astype(np.int64) // (NODE_WIDTH * 8)
+        level = (child[inner] & WORD_MASK).astype(np.int64) // node_words
         if len(level) == 0:
             return most + 1 + NODE_WIDTH
     raise CorruptTreeError(f"the tree is deeper than {MAX_DEPTH} nodes")

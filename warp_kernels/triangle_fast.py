@@ -27,10 +27,12 @@ def _dot(a: wp.vec3, b: wp.vec3):
     return product(a[0], b[0]) + product(a[1], b[1]) + product(a[2], b[2])
 
 
-def fast_triangles(lanes: SimpleNamespace, kept: int) -> SimpleNamespace:
-    """The test for these lanes, its ray kept from word `kept` of the stack."""
+def fast_triangles(lanes: SimpleNamespace, form: SimpleNamespace, kept: int) -> SimpleNamespace:
+    """The test for these lanes and blocks, its ray kept from word `kept` of the stack."""
     length: int = lanes.triangles_length
-    load, vector, products = lanes.load_triangles, lanes.triangles, lanes.products
+    vector, products = lanes.triangles, lanes.products
+    load, edge, edge_at, used = form.load, form.edge, form.edge_at, form.used
+    stride_of, vertex_at = form.stride, form.vertex_at
     store_word, load_word, stack_argument = lanes.store_word, lanes.load_word, lanes.stack_argument
 
     @without_gradient
@@ -53,11 +55,25 @@ def fast_triangles(lanes: SimpleNamespace, kept: int) -> SimpleNamespace:
 
     @without_gradient
     @wp.func
-    def solve(units: wp.uint64, at: int, stack: stack_argument, negative: bool):
-        """t, u and v of one triangle that the ray meets."""
-        v0 = wp.vec3(load_float(units, at), load_float(units, at + 4), load_float(units, at + 8))
-        e1 = wp.vec3(load_float(units, at + 12), load_float(units, at + 16), load_float(units, at + 20))
-        e2 = wp.vec3(load_float(units, at + 24), load_float(units, at + 28), load_float(units, at + 32))
+    def edge_vector(units: wp.uint64, at: int, stride: int, v0: wp.vec3):
+        """From v0 to the vertex at this word."""
+        return wp.vec3(
+            edge_at(units, at, v0[0]),
+            edge_at(units, at + stride, v0[1]),
+            edge_at(units, at + 2 * stride, v0[2]),
+        )
+
+    @without_gradient
+    @wp.func
+    def solve(units: wp.uint64, block: int, j: int, stack: stack_argument, negative: bool):
+        """t, u and v of the block's triangle j, which the ray meets."""
+        stride = stride_of(units, block)
+        at = vertex_at(units, block, 0, j)
+        v0 = wp.vec3(
+            load_float(units, at), load_float(units, at + stride), load_float(units, at + 2 * stride)
+        )
+        e1 = edge_vector(units, vertex_at(units, block, 1, j), stride, v0)
+        e2 = edge_vector(units, vertex_at(units, block, 2, j), stride, v0)
         d = kept_vector(stack, 3)
         p = _cross(d, e2)
         s = kept_vector(stack, 0) - v0
@@ -76,15 +92,15 @@ def fast_triangles(lanes: SimpleNamespace, kept: int) -> SimpleNamespace:
         d0 = vector(d[0])
         d1 = vector(d[1])
         d2 = vector(d[2])
-        sx = vector(o[0]) - load(units, block, lane)
-        sy = vector(o[1]) - load(units, block + 4, lane)
-        sz = vector(o[2]) - load(units, block + 8, lane)
-        e1x = load(units, block + 12, lane)
-        e1y = load(units, block + 16, lane)
-        e1z = load(units, block + 20, lane)
-        e2x = load(units, block + 24, lane)
-        e2y = load(units, block + 28, lane)
-        e2z = load(units, block + 32, lane)
+        sx = vector(o[0]) - load(units, block, lane, 0, 0)
+        sy = vector(o[1]) - load(units, block, lane, 0, 1)
+        sz = vector(o[2]) - load(units, block, lane, 0, 2)
+        e1x = edge(units, block, lane, 1, 0)
+        e1y = edge(units, block, lane, 1, 1)
+        e1z = edge(units, block, lane, 1, 2)
+        e2x = edge(units, block, lane, 2, 0)
+        e2y = edge(units, block, lane, 2, 1)
+        e2z = edge(units, block, lane, 2, 2)
         px = products(d1, e2z) - products(d2, e2y)
         py = products(d2, e2x) - products(d0, e2z)
         pz = products(d0, e2y) - products(d1, e2x)
@@ -102,6 +118,6 @@ def fast_triangles(lanes: SimpleNamespace, kept: int) -> SimpleNamespace:
             # A determinant of zero (a ray in the triangle's plane) and NaN (an unused lane) must fail.
             if u >= 0.0 and v >= 0.0 and u + v <= size and size > 0.0:
                 lanes = lanes | wp.uint32(1 << i)
-        return wp.vec2ui(lanes, wp.uint32(0))
+        return wp.vec2ui(used(units, block, lane, lanes), wp.uint32(0))
 
     return SimpleNamespace(prepare=prepare, candidates=candidates, solve=solve)

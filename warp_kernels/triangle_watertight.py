@@ -9,9 +9,9 @@ import warp as wp
 from wive.warp_kernels.frame import RayFrame, component
 from wive.warp_kernels.lanes import load_float, lowest_lane, product, product_double, without_gradient
 
-# What the test keeps of a ray, in words: the row of the first axis in a block of each sheared axis, the
-# origin, the direction (both sheared axis by axis) and the shear. It is needed in leaves only, so it waits in
-# memory behind the stack's entries and holds no registers meanwhile.
+# What the test keeps of a ray, in words: the axis behind each sheared axis, the origin, the direction (both
+# sheared axis by axis) and the shear. It is needed in leaves only, so it waits in memory behind the stack's
+# entries and holds no registers meanwhile.
 KEPT_WORDS = 11
 
 
@@ -35,16 +35,17 @@ def edges_of(a: wp.vec3d, b: wp.vec3d, c: wp.vec3d):
     )
 
 
-def watertight_triangles(lanes: SimpleNamespace, kept: int) -> SimpleNamespace:
-    """The test for these lanes, its ray kept from word `kept` of the stack."""
+def watertight_triangles(lanes: SimpleNamespace, form: SimpleNamespace, kept: int) -> SimpleNamespace:
+    """The test for these lanes and blocks, its ray kept from word `kept` of the stack."""
     length: int = lanes.triangles_length
-    load, vector, products = lanes.load_triangles, lanes.triangles, lanes.products
+    vector, products = lanes.triangles, lanes.products
+    load, used, stride_of, vertex_at = form.load, form.used, form.stride, form.vertex_at
     store_word, load_word, stack_argument = lanes.store_word, lanes.load_word, lanes.stack_argument
 
     @without_gradient
     @wp.func
-    def axis_row(stack: stack_argument, axis: int):
-        """The words from a vertex's first row to its row of the sheared axis."""
+    def axis_of(stack: stack_argument, axis: int):
+        """The axis of the mesh that is this sheared axis."""
         return int(load_word(stack, kept + axis))
 
     @without_gradient
@@ -75,7 +76,7 @@ def watertight_triangles(lanes: SimpleNamespace, kept: int) -> SimpleNamespace:
         axes = wp.vec3i(x, y, z)
         forward = component(ray.direction, z)
         for i in range(3):
-            store_word(stack, kept + i, wp.uint32(4 * axes[i]))
+            store_word(stack, kept + i, wp.uint32(axes[i]))
             store_word(stack, kept + 3 + i, wp.cast(component(ray.origin, axes[i]), wp.uint32))
             store_word(stack, kept + 6 + i, wp.cast(component(ray.direction, axes[i]), wp.uint32))
         for i in range(2):
@@ -83,66 +84,74 @@ def watertight_triangles(lanes: SimpleNamespace, kept: int) -> SimpleNamespace:
 
     @without_gradient
     @wp.func
-    def rounded(units: wp.uint64, at: int, stack: stack_argument):
+    def rounded(units: wp.uint64, at: int, stride: int, stack: stack_argument):
         """A vertex in the sheared space, in float as the edge functions of all triangles round it."""
-        z = load_float(units, at + axis_row(stack, 2)) - kept_origin(stack, 2)
-        x = (load_float(units, at + axis_row(stack, 0)) - kept_origin(stack, 0)) - product(
+        z = load_float(units, at + stride * axis_of(stack, 2)) - kept_origin(stack, 2)
+        x = (load_float(units, at + stride * axis_of(stack, 0)) - kept_origin(stack, 0)) - product(
             kept_shear(stack, 0), z
         )
-        y = (load_float(units, at + axis_row(stack, 1)) - kept_origin(stack, 1)) - product(
+        y = (load_float(units, at + stride * axis_of(stack, 1)) - kept_origin(stack, 1)) - product(
             kept_shear(stack, 1), z
         )
         return wp.vec3d(wp.float64(x), wp.float64(y), wp.float64(z))
 
     @without_gradient
     @wp.func
-    def away(units: wp.uint64, at: int, stack: stack_argument, axis: int):
+    def away(units: wp.uint64, at: int, stride: int, stack: stack_argument, axis: int):
         """From the ray's origin to a vertex on a sheared axis, exactly or rounded once in double."""
-        return wp.float64(load_float(units, at + axis_row(stack, axis))) - wp.float64(
+        return wp.float64(load_float(units, at + stride * axis_of(stack, axis))) - wp.float64(
             kept_origin(stack, axis)
         )
 
     @without_gradient
     @wp.func
-    def across(units: wp.uint64, at: int, stack: stack_argument, axis: int):
+    def across(units: wp.uint64, at: int, stride: int, stack: stack_argument, axis: int):
         """A vertex on the plane across the ray, scaled by the direction's longest component."""
         forward = wp.float64(kept_direction(stack, 2))
         slope = wp.float64(kept_direction(stack, axis))
-        return product_double(away(units, at, stack, axis), forward) - product_double(
-            slope, away(units, at, stack, 2)
+        return product_double(away(units, at, stride, stack, axis), forward) - product_double(
+            slope, away(units, at, stride, stack, 2)
         )
 
     @without_gradient
     @wp.func(inline=False)
-    def solve(units: wp.uint64, at: int, stack: stack_argument, negative: bool):
+    def solve(units: wp.uint64, block: int, j: int, stack: stack_argument, negative: bool):
         """t, u and v in double, rounded once; of the rounded triangle where only rounding let the ray in."""
-        xa = across(units, at, stack, 0)
-        ya = across(units, at, stack, 1)
-        xb = across(units, at + 12, stack, 0)
-        yb = across(units, at + 12, stack, 1)
-        xc = across(units, at + 24, stack, 0)
-        yc = across(units, at + 24, stack, 1)
+        stride = stride_of(units, block)
+        at_a = vertex_at(units, block, 0, j)
+        at_b = vertex_at(units, block, 1, j)
+        at_c = vertex_at(units, block, 2, j)
+        xa = across(units, at_a, stride, stack, 0)
+        ya = across(units, at_a, stride, stack, 1)
+        xb = across(units, at_b, stride, stack, 0)
+        yb = across(units, at_b, stride, stack, 1)
+        xc = across(units, at_c, stride, stack, 0)
+        yc = across(units, at_c, stride, stack, 1)
         wa = flip(edge_of(xb, yb, xc, yc), negative)
         wb = flip(edge_of(xc, yc, xa, ya), negative)
         wc = flip(edge_of(xa, ya, xb, yb), negative)
         det = wa + wb + wc
         if wp.min(wp.min(wa, wb), wc) < wp.float64(0.0) or det <= wp.float64(0.0):
-            return solve_rounded(units, at, stack)
+            return solve_rounded(units, block, j, stack)
         inverse = wp.float64(1.0) / det
-        za = away(units, at, stack, 2)
-        zb = away(units, at + 12, stack, 2)
-        zc = away(units, at + 24, stack, 2)
+        za = away(units, at_a, stride, stack, 2)
+        zb = away(units, at_b, stride, stack, 2)
+        zc = away(units, at_c, stride, stack, 2)
         height = product_double(wa, za) + product_double(wb, zb) + product_double(wc, zc)
         t = wp.float32(height / (det * wp.float64(kept_direction(stack, 2))))
         return wp.vec3(t, wp.float32(wb * inverse), wp.float32(wc * inverse))
 
     @without_gradient
     @wp.func(inline=False)
-    def solve_rounded(units: wp.uint64, at: int, stack: stack_argument):
+    def solve_rounded(units: wp.uint64, block: int, j: int, stack: stack_argument):
         """The same for the triangle with rounded corners."""
-        a = rounded(units, at, stack)
-        b = rounded(units, at + 12, stack)
-        c = rounded(units, at + 24, stack)
+        stride = stride_of(units, block)
+        at_a = vertex_at(units, block, 0, j)
+        at_b = vertex_at(units, block, 1, j)
+        at_c = vertex_at(units, block, 2, j)
+        a = rounded(units, at_a, stride, stack)
+        b = rounded(units, at_b, stride, stack)
+        c = rounded(units, at_c, stride, stack)
         w = edges_of(a, b, c)
         det = w[0] + w[1] + w[2]
         height = product_double(w[0], a[2]) + product_double(w[1], b[2]) + product_double(w[2], c[2])
@@ -151,11 +160,15 @@ def watertight_triangles(lanes: SimpleNamespace, kept: int) -> SimpleNamespace:
 
     @without_gradient
     @wp.func(inline=False)
-    def side_of(units: wp.uint64, at: int, stack: stack_argument):
+    def side_of(units: wp.uint64, block: int, j: int, stack: stack_argument):
         """The side on which the ray passes the edges, 1 or -1, decided exactly; 0 where it misses."""
-        a = rounded(units, at, stack)
-        b = rounded(units, at + 12, stack)
-        c = rounded(units, at + 24, stack)
+        stride = stride_of(units, block)
+        at_a = vertex_at(units, block, 0, j)
+        at_b = vertex_at(units, block, 1, j)
+        at_c = vertex_at(units, block, 2, j)
+        a = rounded(units, at_a, stride, stack)
+        b = rounded(units, at_b, stride, stack)
+        c = rounded(units, at_c, stride, stack)
         w = edges_of(a, b, c)
         zero = wp.float64(0.0)
         negative = wp.where(w[0] < zero or w[1] < zero or w[2] < zero, 1, 0)
@@ -166,23 +179,23 @@ def watertight_triangles(lanes: SimpleNamespace, kept: int) -> SimpleNamespace:
     @wp.func
     def candidates(units: wp.uint64, block: int, lane: int, stack: stack_argument):
         """The lanes whose triangle the ray's line meets, one bit each, and those passed clockwise."""
-        row_x = block + axis_row(stack, 0)
-        row_y = block + axis_row(stack, 1)
-        row_z = block + axis_row(stack, 2)
+        x = axis_of(stack, 0)
+        y = axis_of(stack, 1)
+        z = axis_of(stack, 2)
         ox = vector(kept_origin(stack, 0))
         oy = vector(kept_origin(stack, 1))
         oz = vector(kept_origin(stack, 2))
         sx = vector(kept_shear(stack, 0))
         sy = vector(kept_shear(stack, 1))
-        za = load(units, row_z, lane) - oz
-        zb = load(units, row_z + 12, lane) - oz
-        zc = load(units, row_z + 24, lane) - oz
-        xa = (load(units, row_x, lane) - ox) - products(sx, za)
-        xb = (load(units, row_x + 12, lane) - ox) - products(sx, zb)
-        xc = (load(units, row_x + 24, lane) - ox) - products(sx, zc)
-        ya = (load(units, row_y, lane) - oy) - products(sy, za)
-        yb = (load(units, row_y + 12, lane) - oy) - products(sy, zb)
-        yc = (load(units, row_y + 24, lane) - oy) - products(sy, zc)
+        za = load(units, block, lane, 0, z) - oz
+        zb = load(units, block, lane, 1, z) - oz
+        zc = load(units, block, lane, 2, z) - oz
+        xa = (load(units, block, lane, 0, x) - ox) - products(sx, za)
+        xb = (load(units, block, lane, 1, x) - ox) - products(sx, zb)
+        xc = (load(units, block, lane, 2, x) - ox) - products(sx, zc)
+        ya = (load(units, block, lane, 0, y) - oy) - products(sy, za)
+        yb = (load(units, block, lane, 1, y) - oy) - products(sy, zb)
+        yc = (load(units, block, lane, 2, y) - oy) - products(sy, zc)
         u = products(xc, yb) - products(yc, xb)
         v = products(xa, yc) - products(ya, xc)
         w = products(xb, ya) - products(yb, xa)
@@ -192,6 +205,7 @@ def watertight_triangles(lanes: SimpleNamespace, kept: int) -> SimpleNamespace:
         for i in range(length):
             if low[i] >= 0.0 or high[i] <= 0.0:
                 lanes = lanes | wp.uint32(1 << i)
+        lanes = used(units, block, lane, lanes)
         negative = wp.uint32(0)
         if lanes != wp.uint32(0):
             ties = wp.uint32(0)
@@ -206,7 +220,7 @@ def watertight_triangles(lanes: SimpleNamespace, kept: int) -> SimpleNamespace:
                 i = lowest_lane(ties)
                 bit = wp.uint32(1) << wp.uint32(i)
                 ties = ties ^ bit
-                side = side_of(units, block + wp.where(length == 1, lane & 3, i), stack)
+                side = side_of(units, block, wp.where(length == 1, lane & 3, i), stack)
                 lanes = lanes & ~wp.where(side == 0, bit, wp.uint32(0))
                 negative = (negative & ~bit) | wp.where(side < 0, bit, wp.uint32(0))
         return wp.vec2ui(lanes, negative)

@@ -14,7 +14,8 @@ compiler: str  # the C++ compiler's name and version
 def kernels() -> dict[str, str]:
     """Every traversal kernel compiled in, best first, and why this machine can't run it ("" where it can).
 
-    Names: "avx512" (the better of the two forms below), "avx512.full", "avx512.half", "avx2", "scalar".
+    Names: "avx512" (the better of the two forms below), "avx512.full", "avx512.half", "avx2", "scalar"; and,
+    sorting children by distance for comparisons, "avx512.distance" and "scalar.distance".
     """
 
 class Bvh:
@@ -25,9 +26,10 @@ class Bvh:
         vertices: NDArray[np.float32],
         faces: NDArray[np.int32],
         accuracy: Literal["fast", "watertight", "exact"] = "watertight",
-        order: Literal["treelet", "diagonal", "none"] = "treelet",
+        order: Literal["treelet", "diagonal", "slots", "none"] = "treelet",
         threads: int = 0,
         depth_limit: int = 64,
+        nodes: Literal["float32", "compressed"] = "float32",
     ) -> None:
         """Build over vertices (v,3), faces (f,3). threads 0 means every core.
 
@@ -36,13 +38,19 @@ class Bvh:
         """
     @property
     def nodes(self) -> NDArray[np.uint32]:
-        """(m,8,8) read-only view, rows lo.x hi.x lo.y hi.y lo.z hi.z child order; planes are float32 bits."""
+        """(m,8,8) read-only view, rows lo.x hi.x lo.y hi.y lo.z hi.z child order; planes are float32 bits.
+
+        Compressed: (m,4,8), the 128 bytes of CompressedNode in cpu/compressed.h.
+        """
     @property
     def blocks(self) -> NDArray[np.uint32]:
-        """(b,10,4) read-only view: nine float32 rows (fast: v0 e1 e2; else: v0 v1 v2), the prim row."""
+        """(b,10,4) read-only view: nine float32 rows (fast: v0 e1 e2; else: v0 v1 v2), the prim row.
+
+        Compressed: (units,8), blocks of three or four units, CompressedBlock in cpu/compressed.h.
+        """
     @property
     def units(self) -> NDArray[np.uint32]:
-        """(8 m + 5 b, 8) read-only view of all of it: nodes, then blocks, in units of 32 bytes.
+        """(units,8) read-only view of all of it: nodes, then blocks, in units of 32 bytes.
 
         A child reference holds (unit << 3); a leaf sets bit 31 and its number of blocks less one in the low 3
         bits.
@@ -58,6 +66,9 @@ class Bvh:
         """(2,3) lowest and highest corner of the triangles that can be hit; inf, -inf without any."""
     @property
     def accuracy(self) -> str: ...
+    @property
+    def node_form(self) -> str:
+        """ "float32" or "compressed"."""
     @property
     def depth(self) -> int:
         """Inner nodes on the longest way from the root down."""
@@ -141,11 +152,14 @@ class Bvh:
         albedo: Literal["gray", "normals"],
         seed: int = 0,
         threads: int = 0,
+        in_flight: int = 0,
+        tracer: tuple[int, int] | None = None,
     ) -> int:
         """Path-trace rows [row_begin, row_end) of image (height,width,3) in place; returns the rays traced.
 
         camera (4,3): eye, then the vectors from the eye to the picture's centre, from its centre to the right
         edge's middle, and from its centre to the top edge's middle. Linear radiance under a white sky of
         radiance 1. Random numbers come from (pixel, sample, bounce) alone, so a picture does not depend on
-        threads or kernel.
+        threads or kernel. tracer: addresses of a C function that traces in the kernel's place and of its
+        context (ForeignTracer in cpu/render.h), for comparisons.
         """

@@ -124,5 +124,6 @@ def _add_scene_options(parser: argparse.ArgumentParser, threads: bool = True) ->
     parser.add_argument("--backend", default="auto", help=f"auto, {', '.join(CPU_BACKENDS)}, {WARP}")
     parser.add_argument("--device", help="Warp device such as cuda:0 or cpu; implies --backend warp")
     parser.add_argument("--accuracy", default="watertight", help="fast, watertight or exact")
+    parser.add_argument("--nodes", default="float32", help="float32 or compressed")
     if threads:
         parser.add_argument("--threads", type=int, help="default: every core")

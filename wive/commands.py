@@ -90,6 +90,7 @@ def describe_mesh(options: Namespace) -> None:
         ("backend", _tracer(scene)),
         ("accuracy", scene.accuracy),
         ("nodes", f"{len(tree.nodes):,}"),
+        ("form", f"{scene.nodes} nodes"),
         ("depth", f"{tree.depth}"),
         (
             "SAH cost",
@@ -110,7 +111,14 @@ def list_backends(options: Namespace) -> None:
 
 
 def _scene(options: Namespace, vertices: NDArray[Any], faces: NDArray[Any]) -> Scene:
-    return Scene(vertices, faces, backend=options.backend, device=options.device, accuracy=options.accuracy)
+    return Scene(
+        vertices,
+        faces,
+        backend=options.backend,
+        device=options.device,
+        accuracy=options.accuracy,
+        nodes=options.nodes,
+    )
 
 
 def _usable(backend: Backend) -> str:

@@ -38,7 +38,7 @@ class Scene(CrossingQueries):
         backend: str = "auto",
         device: str | None = None,
         accuracy: Literal["fast", "watertight", "exact"] = "watertight",
-        nodes: Literal["float32"] = "float32",
+        nodes: Literal["float32", "compressed"] = "float32",
     ) -> None:
         """Build the tree.
 
@@ -49,9 +49,10 @@ class Scene(CrossingQueries):
             backend: "auto" (the fastest CPU backend this machine has) or a name in `wive.backends()`.
             device: where backend "warp" traces, by Warp's names: "cpu", "cuda:0", ...; None is the first CUDA
                 device, else "cpu". A device alone implies backend "warp"; CPU backends take none.
-            accuracy: "watertight" (rays never slip between triangles that share an edge or vertex), "fast", or
-                "exact" (hits, their order, t and uv are those of exact arithmetic, rounded once).
-            nodes: "float32".
+            accuracy: "watertight" (rays never slip between triangles that share an edge or vertex), "fast",
+                or "exact" (hits, their order, t and uv are those of exact arithmetic, rounded once).
+            nodes: "float32", or "compressed": the same hits from a tree of less than two thirds the bytes;
+                slower where trees fit into the processor's caches, faster where they don't.
 
         C-contiguous float32 vertices and int32 faces are kept, not copied: don't change them afterwards.
 
@@ -59,12 +60,12 @@ class Scene(CrossingQueries):
         or infinite or of a face out of range.
         """
         arguments.choice("accuracy", accuracy, ("fast", "watertight", "exact"))
-        arguments.choice("nodes", nodes, ("float32",))
+        arguments.choice("nodes", nodes, ("float32", "compressed"))
         self._options = Options(backend=backend, device=device, accuracy=accuracy, nodes=nodes)
         self._backend, self._device = resolve_backend(backend, device)
         mesh = arguments.mesh(host_array("vertices", vertices), host_array("faces", faces))
         self._vertices, self._faces = map(_read_only, mesh)
-        self._bvh = _cpu.Bvh(self._vertices, self._faces, accuracy)
+        self._bvh = _cpu.Bvh(self._vertices, self._faces, accuracy, nodes=nodes)
         if self._device is not None:
             from wive.warp_tracer import WarpTracer
 
@@ -247,6 +248,11 @@ class Scene(CrossingQueries):
     def accuracy(self) -> str:
         """ "watertight", "fast" or "exact"."""
         return self._bvh.accuracy
+
+    @property
+    def nodes(self) -> str:
+        """ "float32" or "compressed"."""
+        return self._bvh.node_form
 
     def __len__(self) -> int:
         """Number of triangles."""

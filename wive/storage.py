@@ -19,7 +19,7 @@ class Options(TypedDict):
     backend: str
     device: str | None
     accuracy: Literal["fast", "watertight", "exact"]
-    nodes: Literal["float32"]
+    nodes: Literal["float32", "compressed"]
 
 
 def write_scene(

@@ -1,0 +1,144 @@
+"""Building against native Embree, from 100 thousand to 20 million triangles: seconds, SAH cost, bytes.
+
+Wall-clock seconds of wive's constructor and of rtcCommitScene, in turn, at equal numbers of threads and
+equal build quality; a ratio above 1 means that wive is faster. Two families of meshes: one piece of terrain
+sampled ever finer, and ever more copies of a model side by side. `ns_per_triangle` shows how cost grows:
+constant would be linear. SAH cost is relative to the root's area, as Embree prints it; bytes are of nodes
+and leaves.
+"""
+
+import argparse
+import resource
+from collections.abc import Sequence
+
+import matplotlib
+
+from bench import report
+from bench.build_race import build_rows, tree_row
+from bench.features import QUALITIES, qualities
+from bench.native_embree import Isa
+from bench.options import listed, numbers, scene_parser
+from bench.scenes import TERRAIN, SceneFolder
+from bench.timing import Effort, core_count
+from wive import _cpu
+
+matplotlib.use("Agg")
+from matplotlib import pyplot
+from matplotlib.figure import Figure
+
+TERRAINS = ("terrain_100k", "terrain_400k", "terrain_1600k", "terrain_6400k", "terrain_20000k")
+TILES = ("1x1", "2x2", "5x5")
+QUICK_SCENES = ("terrain_10k", "terrain_40k")
+QUICK_EFFORT = Effort(least=2, most=2)
+# As many rounds as large meshes leave time for: about so many triangles are built a side.
+TRIANGLES_BUILT = 10_000_000
+FEWEST_ROUNDS, MOST_ROUNDS = 3, 15
+LARGEST_HIGH = 4_000_000  # triangles: what "high" quality is built of, several times as long
+MEMORY_LIMIT = 16 << 30  # bytes of address space: rather an error than a machine that swaps
+
+COLUMNS = [
+    "scene", "triangles", "quality", "threads", "ratio", "low", "high", "wive_seconds", "embree_seconds",
+    "wive_ns_per_triangle", "embree_ns_per_triangle", "rounds",
+]  # fmt: skip
+TREE_COLUMNS = [
+    "scene", "triangles", "quality", "sah_ratio", "wive_sah", "embree_sah", "bytes_ratio", "wive_bytes",
+    "embree_bytes", "embree_allocated", "wive_nodes", "embree_nodes", "wive_depth", "embree_depth",
+]  # fmt: skip
+
+
+def main(options: Sequence[str]) -> None:
+    """Runs the bench with command-line options."""
+    chosen = parse_options(options)
+    _, hard = resource.getrlimit(resource.RLIMIT_AS)
+    resource.setrlimit(resource.RLIMIT_AS, (MEMORY_LIMIT, hard))
+    folder = SceneFolder(chosen.scene_dir)
+    names = folder.check(chosen.scenes or (QUICK_SCENES if chosen.quick else scene_names(folder)))
+    isa: Isa = "avx2" if _cpu.kernels().get("avx512") else "avx512"
+    build: list[report.Row] = []
+    trees: list[report.Row] = []
+    for name in names:
+        mesh = folder.load(name)
+        rounds = max(FEWEST_ROUNDS, min(MOST_ROUNDS, TRIANGLES_BUILT // len(mesh.faces)))
+        effort = QUICK_EFFORT if chosen.quick else Effort(least=min(7, rounds), most=rounds)
+        for quality in qualities(chosen.quality):
+            if quality == "high" and len(mesh.faces) > LARGEST_HIGH and not chosen.quality:
+                continue
+            for row in build_rows(mesh, "watertight", isa, chosen.threads, effort, quality):  # type: ignore[arg-type]
+                for side in ("wive", "embree"):
+                    row[f"{side}_ns_per_triangle"] = row[f"{side}_seconds"] / len(mesh.faces) * 1e9
+                build.append(row)
+                report.print_progress(
+                    row, ("scene", "triangles", "quality", "threads", "ratio", "wive_seconds")
+                )
+            trees.append(tree_row(mesh, "watertight", isa, quality))  # type: ignore[arg-type]
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20
+    report.print_table(build, COLUMNS, "Building, equal threads: Embree's seconds over wive's")
+    report.print_table(
+        trees, TREE_COLUMNS, "Trees, wive's over Embree's: SAH relative to the root, bytes a triangle"
+    )
+    print(f"\npeak memory of this process: {peak:.1f} GiB")
+    content = {"isa": isa, "peak_gib": peak, "build": build, "trees": trees}
+    whole = not (chosen.quick or chosen.scenes or chosen.quality or chosen.threads != default_threads())
+    report.save("build", content, draw(build), chosen.out, whole=whole)
+
+
+def scene_names(folder: SceneFolder) -> list[str]:
+    """Both families, each from small to large."""
+    model = "bmw_m6" if "bmw_m6" in folder.names() else TERRAIN
+    return [*TERRAINS, *(f"{model}_tiled_{tiles}" for tiles in TILES)]
+
+
+def default_threads() -> tuple[int, ...]:
+    """One thread, and all there are."""
+    return tuple(dict.fromkeys((1, core_count())))
+
+
+def draw(build: Sequence[report.Row]) -> Figure:
+    """Nanoseconds a triangle, and the ratio, over triangles: a line per family, quality and threads."""
+    figure, (cost, ratio) = pyplot.subplots(1, 2, figsize=(11, 4.6), layout="constrained")
+    keys = list(dict.fromkeys((_family(row), row["quality"], row["threads"]) for row in build))
+    for i, key in enumerate(keys):
+        rows = [row for row in build if (_family(row), row["quality"], row["threads"]) == key]
+        triangles = [row["triangles"] for row in rows]
+        family, quality, threads = key
+        label = f"{family}, {quality}, {threads} thread{'s' * (threads > 1)}"
+        cost.plot(
+            triangles, [row["wive_ns_per_triangle"] for row in rows], marker="o", markersize=3, color=f"C{i}",
+            label=label,
+        )  # fmt: skip
+        cost.plot(
+            triangles,
+            [row["embree_ns_per_triangle"] for row in rows],
+            linestyle="--",
+            linewidth=1,
+            color=f"C{i}",
+        )
+        ratio.plot(triangles, [row["ratio"] for row in rows], marker="o", markersize=3, color=f"C{i}")
+    ratio.axhline(1.0, color="0.4", linewidth=1)
+    cost.set_ylabel("nanoseconds a triangle; dashed: Embree")
+    ratio.set_ylabel("Embree's seconds over wive's")
+    for panel in (cost, ratio):
+        panel.set_xscale("log")
+        panel.set_xlabel("triangles")
+        panel.set_ylim(bottom=0)
+        panel.grid(color="0.92", linewidth=0.8)
+        panel.spines[["top", "right"]].set_visible(False)
+    cost.legend(frameon=False, fontsize=8)
+    return figure
+
+
+def _family(row: report.Row) -> str:
+    name: str = row["scene"]
+    return name.split("_tiled_")[0] if "_tiled_" in name else name.split("_")[0]
+
+
+def parse_options(options: Sequence[str]) -> argparse.Namespace:
+    """The command line's choices."""
+    parser = scene_parser("build", __doc__)
+    parser.add_argument(
+        "--threads", type=numbers, default=default_threads(), help="numbers of threads, e.g. 1,2"
+    )
+    parser.add_argument(
+        "--quality", type=listed(QUALITIES), default=(), help="build qualities; all this build has"
+    )
+    return parser.parse_args(options)

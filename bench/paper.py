@@ -1,0 +1,244 @@
+"""The WiVe paper's comparison redone: path tracing with its traversals and with Embree's, per scene.
+
+Fuetterling, Lojewski, Pfreundt, Hamann, Ebert: "Accelerated Single Ray Tracing for Wide Vector Units", HPG
+2017, compares two forms with Embree's single rays: `half` on AVX-512 and `full` on AVX2. Here, too, one
+renderer traces diffuse paths of up to eight bounces off screen at 3840 x 2160, and only the traversal is
+swapped. To save time a picture is --rows whole rows spread evenly over it, --samples paths a pixel. Each
+row is rendered by wive, then by Embree held to the same instruction set, on one pinned core; `gain` is the
+median over rows of Embree's seconds over wive's, less one, in percent, shading included on both sides;
+`total_gain` that of all rows together. With one ray in flight it is the paper's algorithm; `tuned` is
+wive's default for batches, which here are of --samples x 32 rays, fewer at each bounce. `differing`: share
+of pixels that the two pictures disagree on; `mean_difference`: of the pictures, relative to their mean.
+Both are near 0 where both sides find the same hits.
+
+The paper's own tables, on other scenes and processors, are at doi.org/10.1145/3105762.3105785.
+"""
+
+import argparse
+import sys
+import time
+from collections.abc import Iterator, Sequence
+
+import matplotlib
+import numpy as np
+from numpy.typing import NDArray
+
+from bench import report
+from bench.compiled_shim import BenchError
+from bench.embree import usable_kernels
+from bench.embree_race import TUNED, Contender, embree_tree
+from bench.features import Accuracy, build_tree
+from bench.native_embree import EmbreeMesh
+from bench.options import in_flights, listed, scene_parser
+from bench.scenes import Mesh, SceneFolder
+from bench.timing import Comparison, geometric_mean, one_core
+from wive import _cpu
+from wive.camera import Camera
+
+matplotlib.use("Agg")
+from matplotlib import pyplot
+from matplotlib.figure import Figure
+
+WIDTH, HEIGHT = 3840, 2160
+QUICK_WIDTH, QUICK_HEIGHT = 192, 108
+BOUNCES = 8
+ROWS, QUICK_ROWS = 10, 4
+SAMPLES = 16
+KERNELS = ("avx512.half", "avx512.full", "avx2")  # the paper's two, and full on AVX-512
+IN_FLIGHT = (1, TUNED)
+ACCURACIES: tuple[Accuracy, ...] = ("fast", "watertight")
+# Pictures that differ by more than this share of their mean are no longer the same work: says so.
+LARGEST_DIFFERENCE = 0.01
+
+COLUMNS = [
+    "scene", "triangles", "accuracy", "kernel", "in_flight", "gain", "low", "high", "total_gain",
+    "wive_mrays", "embree_mrays", "rows", "differing", "mean_difference",
+]  # fmt: skip
+MEAN_COLUMNS = ["accuracy", "kernel", "in_flight", "mean_gain", "lowest", "highest"]
+
+
+def main(options: Sequence[str]) -> None:
+    """Runs the bench with command-line options."""
+    chosen = parse_options(options)
+    folder = SceneFolder(chosen.scene_dir)
+    kernels = usable_kernels(chosen.kernels)
+    contenders = [Contender(kernel, in_flight) for kernel in kernels for in_flight in chosen.in_flight]
+    rows: list[report.Row] = []
+    for name in folder.check(chosen.scenes):
+        mesh = folder.load(name)
+        for accuracy in chosen.accuracy:
+            for row in scene_rows(mesh, accuracy, contenders, chosen):
+                rows.append(row)
+                report.print_progress(row, ("scene", "accuracy", "kernel", "in_flight", "gain", "differing"))
+                if row["mean_difference"] > LARGEST_DIFFERENCE:
+                    print(f"{name}: the two pictures differ by {row['mean_difference']:.1%}", file=sys.stderr)
+    means = mean_rows(rows)
+    what = (
+        f"{chosen.width} x {chosen.height}, {chosen.rows} rows, {chosen.samples} samples, {BOUNCES} bounces"
+    )
+    report.print_table(rows, COLUMNS, f"Path tracing, gain over Embree's single rays in percent: {what}")
+    report.print_table(means, MEAN_COLUMNS, "Over all scenes, in percent")
+    content = {
+        "width": chosen.width,
+        "height": chosen.height,
+        "samples": chosen.samples,
+        "bounces": BOUNCES,
+        "rows": rows,
+        "means": means,
+    }
+    report.save("paper", content, draw(rows), chosen.out, whole=is_whole(chosen))
+
+
+def scene_rows(
+    mesh: Mesh, accuracy: Accuracy, contenders: Sequence[Contender], chosen: argparse.Namespace
+) -> Iterator[report.Row]:
+    """One row of results per contender."""
+    tree = build_tree(mesh, accuracy)
+    for isa in dict.fromkeys(contender.isa for contender in contenders):
+        with embree_tree(mesh, accuracy, isa) as theirs:
+            theirs.commit()
+            for contender in (one for one in contenders if one.isa == isa):
+                yield {
+                    "scene": mesh.name,
+                    "triangles": len(mesh.faces),
+                    "accuracy": accuracy,
+                    "kernel": contender.kernel,
+                    "in_flight": contender.in_flight or "tuned",
+                    "isa": isa,
+                    **race(mesh, tree, theirs, contender, chosen),
+                }
+
+
+def race(
+    mesh: Mesh, tree: _cpu.Bvh, theirs: EmbreeMesh, contender: Contender, chosen: argparse.Namespace
+) -> report.Row:
+    """Renders the rows in turn by both; columns of speed and of difference."""
+    camera = Camera(mesh.camera.eye, mesh.camera.target, mesh.camera.up, mesh.camera.fov)
+    frame = camera.frame(chosen.width, chosen.height)
+    size = (chosen.height, chosen.width, 3)
+    picture, their_picture = np.zeros(size, np.float32), np.zeros(size, np.float32)
+    places = ((np.arange(chosen.rows) + 0.5) / chosen.rows * chosen.height).astype(int).tolist()
+
+    def render(
+        image: NDArray[np.float32], row: int, tracer: tuple[int, int] | None, rows: int = 1
+    ) -> tuple[float, int]:
+        start = time.process_time()
+        rays = tree.render_rows(
+            contender.kernel, frame, image, row, row + rows, chosen.samples, BOUNCES, "gray", threads=1,
+            in_flight=contender.in_flight, tracer=tracer,
+        )  # fmt: skip
+        return time.process_time() - start, rays
+
+    with one_core():
+        render(picture, places[0], None)
+        render(their_picture, places[0], theirs.tracer)  # both warmed up
+        # Each call checks the mesh first, as if for a whole picture: not for one row to pay.
+        checking = float(np.median([render(picture, 0, None, rows=0)[0] for _ in range(5)]))
+        pairs = [(render(picture, row, None), render(their_picture, row, theirs.tracer)) for row in places]
+    our_seconds, their_seconds = ([pair[side][0] - checking for pair in pairs] for side in (0, 1))
+    our_rays, their_rays = (sum(pair[side][1] for pair in pairs) for side in (0, 1))
+    outcome = Comparison.of(our_seconds, their_seconds)
+    difference = np.abs(picture[places] - their_picture[places])
+    mean = float(picture[places].mean(dtype=np.float64))
+    if mean == 0:
+        raise BenchError(
+            f"{mesh.name}: no path of the picture reaches the sky, so pictures can't be compared"
+        )
+    return {
+        "gain": percent(outcome.ratio),
+        "low": percent(outcome.low),
+        "high": percent(outcome.high),
+        "total_gain": percent(sum(their_seconds) / sum(our_seconds)),
+        "wive_mrays": our_rays / sum(our_seconds) * 1e-6,
+        "embree_mrays": their_rays / sum(their_seconds) * 1e-6,
+        "rows": len(places),
+        "differing": float((difference.max(axis=-1) > 1e-6).mean()),
+        "mean_difference": float(difference.mean(dtype=np.float64)) / mean,
+    }
+
+
+def percent(ratio: float) -> float:
+    """By how much more than one, in percent."""
+    return 100 * (ratio - 1)
+
+
+def mean_rows(rows: Sequence[report.Row]) -> list[report.Row]:
+    """Geometric mean and range of the gain over scenes, per accuracy, kernel and rays in flight."""
+    keys = ("accuracy", "kernel", "in_flight")
+    means = []
+    for key in dict.fromkeys(tuple(row[name] for name in keys) for row in rows):
+        gains = [row["gain"] for row in rows if tuple(row[name] for name in keys) == key]
+        mean = percent(geometric_mean([1 + gain / 100 for gain in gains]))
+        means.append(
+            {
+                **dict(zip(keys, key, strict=True)),
+                "mean_gain": mean,
+                "lowest": min(gains),
+                "highest": max(gains),
+            }
+        )
+    return means
+
+
+def draw(rows: Sequence[report.Row]) -> Figure:
+    """Bars of the gain: a panel per accuracy and kernel, a colour per number of rays in flight."""
+    accuracies = list(dict.fromkeys(row["accuracy"] for row in rows))
+    kernels = list(dict.fromkeys(row["kernel"] for row in rows))
+    flights = list(dict.fromkeys(row["in_flight"] for row in rows))
+    scenes = list(dict.fromkeys(row["scene"] for row in rows))
+    figure, panels = pyplot.subplots(
+        len(accuracies), len(kernels), sharex=True, sharey=True, squeeze=False, layout="constrained",
+        figsize=(2.4 + 3.4 * len(kernels), 0.8 + len(accuracies) * (0.7 + 0.36 * len(scenes))),
+    )  # fmt: skip
+    height = 0.8 / len(flights)
+    for accuracy, line in zip(accuracies, panels, strict=True):
+        for kernel, panel in zip(kernels, line, strict=True):
+            for i, flight in enumerate(flights):
+                gains = {
+                    row["scene"]: row["gain"]
+                    for row in rows
+                    if (row["accuracy"], row["kernel"], row["in_flight"]) == (accuracy, kernel, flight)
+                }
+                places = [scenes.index(scene) + (i - (len(flights) - 1) / 2) * height for scene in gains]
+                label = "one ray at a time" if flight == 1 else f"in flight: {flight}"
+                bars = panel.barh(places, list(gains.values()), height * 0.9, label=label, color=f"C{i}")
+                panel.bar_label(bars, fmt="%.0f", fontsize=7, padding=2)
+            panel.axvline(0, color="0.4", linewidth=1)
+            panel.set_title(f"{kernel}, {accuracy}", fontsize=9)
+            panel.set_yticks(range(len(scenes)), scenes, fontsize=8)
+            panel.set_ylim(len(scenes) - 0.5, -0.5)
+            panel.margins(x=0.15)
+            panel.tick_params(length=0, labelsize=8)
+            panel.spines[["top", "right", "left"]].set_visible(False)
+    for panel in panels[-1]:
+        panel.set_xlabel("gain over Embree in percent", fontsize=9)
+    handles, labels = panels[0][0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=len(labels), frameon=False, fontsize=9)
+    return figure
+
+
+def parse_options(options: Sequence[str]) -> argparse.Namespace:
+    """The command line's choices."""
+    parser = scene_parser("paper", __doc__)
+    parser.add_argument(
+        "--kernels", type=listed(), default=KERNELS, help="wive's kernels, e.g. avx512.half,avx2"
+    )
+    parser.add_argument(
+        "--in-flight", type=in_flights, default=IN_FLIGHT, help="rays in flight, e.g. 1,tuned"
+    )
+    parser.add_argument("--accuracy", type=listed(ACCURACIES), default=ACCURACIES, help=", ".join(ACCURACIES))
+    parser.add_argument("--rows", type=int, help=f"rows of the picture that are rendered; default {ROWS}")
+    parser.add_argument("--samples", type=int, default=SAMPLES, help="paths a pixel")
+    chosen = parser.parse_args(options)
+    chosen.width, chosen.height = (QUICK_WIDTH, QUICK_HEIGHT) if chosen.quick else (WIDTH, HEIGHT)
+    chosen.rows = chosen.rows or (QUICK_ROWS if chosen.quick else ROWS)
+    if not 1 <= chosen.rows <= chosen.height or chosen.samples < 1:
+        parser.error(f"expected 1 to {chosen.height} rows and at least one sample")
+    return chosen
+
+
+def is_whole(chosen: argparse.Namespace) -> bool:
+    """Whether nothing that docs quote was left out."""
+    everything = {"kernels": KERNELS, "in_flight": IN_FLIGHT, "accuracy": ACCURACIES}
+    complete = all(set(getattr(chosen, name)) >= set(values) for name, values in everything.items())
+    return complete and not chosen.quick and not chosen.scenes and chosen.rows >= ROWS

@@ -1,0 +1,196 @@
+"""What a Python user sees: the same NumPy rays through embreex, trimesh, Warp, Open3D and wive, arrays out.
+
+`ratio`: the other's seconds over wive's for the same query on the same rays, in turn; above 1 wive is
+faster. trimesh's intersector is measured against `wive.Scene` and against its drop-in replacement in
+`wive.trimesh`. With one thread both are held to one core and CPU time counts; with all threads wall-clock
+time does (embreex, trimesh and Warp's CPU device use one thread whatever there is). Each as it comes: wive
+watertight, the others as their defaults are. `hits`: how many each found; all-hit counts differ where
+trimesh steps over near hits or finds one twice. The last table has microseconds of a whole call for a
+single ray, median and 99th percentile.
+"""
+
+import argparse
+from collections.abc import Iterator, Sequence
+
+import matplotlib
+import numpy as np
+
+from bench import report
+from bench.latency import QUICK_SECONDS, measured
+from bench.options import listed, scene_parser
+from bench.python_callers import ALL, QUERIES, SCENE, Caller, Ours, absent, answered, others
+from bench.rays import Rays, recorded_rays
+from bench.scenes import Mesh, SceneFolder
+from bench.timing import QUICK, Effort, compare, core_count, geometric_mean, one_core, timed, wall_timed
+
+matplotlib.use("Agg")
+from matplotlib import pyplot
+from matplotlib.figure import Figure
+
+SCENES = ("living_room", "bmw_m6", "bathroom_salledebain")
+RAY_KINDS = ("primary", "diffuse", "random")
+RAYS, QUICK_RAYS = 131_072, 4_096
+# All hits: trimesh casts every ray again from each of its hits.
+ALL_HITS_RAYS, QUICK_ALL_HITS_RAYS = 16_384, 256
+EFFORT = Effort(least=5, most=9)
+SINGLE_RAYS = 64  # different ones, called in turn
+SINGLE_SECONDS = 0.5
+
+COLUMNS = [
+    "scene", "triangles", "rays", "query", "ours", "other", "threads", "count", "ratio", "low", "high",
+    "wive_mrays", "other_mrays", "wive_hits", "other_hits", "rounds",
+]  # fmt: skip
+MEAN_COLUMNS = ["query", "ours", "other", "threads", "mean", "lowest", "lowest_at"]
+SINGLE_COLUMNS = ["scene", "query", "caller", "p50_us", "p99_us", "calls"]
+
+
+def main(options: Sequence[str]) -> None:
+    """Runs the bench with command-line options."""
+    chosen = parse_options(options)
+    folder = SceneFolder(chosen.scene_dir)
+    usual = [name for name in SCENES if name in folder.names()] or folder.names()
+    rows: list[report.Row] = []
+    single: list[report.Row] = []
+    missing = [f"{name} is not installed" for name in absent()]
+    missing += [f"this version of wive has no query for {query}" for query in QUERIES if not answered(query)]
+    for name in folder.check(chosen.scenes or usual):
+        mesh = folder.load(name)
+        recorded = recorded_rays(mesh)
+        ours = Ours(mesh)
+        rivals = [other for other in others(mesh) if answered(other.query)]
+        for kind in chosen.rays:
+            for row in speed_rows(mesh, ours, rivals, recorded[kind], chosen.quick):
+                rows.append(row)
+                report.print_progress(row, ("scene", "rays", "other", "threads", "ratio"))
+        single += single_rows(mesh, ours, rivals, recorded["random"], chosen.quick)
+    means = mean_rows(rows)
+    report.print_table(rows, COLUMNS, "NumPy in and out: the other's seconds over wive's")
+    report.print_table(means, MEAN_COLUMNS, "Geometric mean and lowest over scenes and rays")
+    report.print_table(single, SINGLE_COLUMNS, "One ray: microseconds a call")
+    print("".join(f"\n{line}" for line in missing))
+    content = {"missing": missing, "rows": rows, "means": means, "single": single}
+    whole = not (chosen.quick or chosen.scenes) and chosen.rays == RAY_KINDS
+    report.save("python", content, draw(means), chosen.out, whole=whole)
+
+
+def speed_rows(
+    mesh: Mesh, ours: Ours, rivals: Sequence[Caller], recorded: Rays, quick: bool
+) -> Iterator[report.Row]:
+    """One row per rival, number of threads and counterpart of ours."""
+    for rival in rivals:
+        if rival.query == ALL:
+            rays = recorded.thinned(QUICK_ALL_HITS_RAYS if quick else ALL_HITS_RAYS)
+        else:
+            rays = recorded.thinned(QUICK_RAYS if quick else RAYS)
+        for threads in dict.fromkeys((1, core_count())):
+            for mine in ours.counterparts(rival, threads):
+                yield {
+                    "scene": mesh.name,
+                    "triangles": len(mesh.faces),
+                    "rays": rays.kind,
+                    "query": rival.query,
+                    "ours": mine.name,
+                    "other": rival.name,
+                    "threads": threads,
+                    "count": len(rays),
+                    **race(mine, rival, rays, threads, quick),
+                }
+
+
+def race(ours: Caller, rival: Caller, rays: Rays, threads: int, quick: bool) -> report.Row:
+    """Times both in turn on the same arrays."""
+    timer = timed if threads == 1 else wall_timed
+    arrays = rays.origins, rays.directions
+    found = ours.hits(ours.call(*arrays)), int(rival.hits(rival.call(*arrays)))  # warms up, too
+    runs = timer(lambda: ours.call(*arrays)), timer(lambda: rival.call(*arrays))
+    if threads == 1:
+        with one_core():
+            outcome = compare(*runs, QUICK if quick else EFFORT)
+    else:
+        outcome = compare(*runs, QUICK if quick else EFFORT)
+    return {
+        "ratio": outcome.ratio,
+        "low": outcome.low,
+        "high": outcome.high,
+        "wive_mrays": len(rays) / outcome.our_seconds * 1e-6,
+        "other_mrays": len(rays) / outcome.their_seconds * 1e-6,
+        "wive_hits": found[0],
+        "other_hits": found[1],
+        "rounds": outcome.rounds,
+    }
+
+
+def single_rows(
+    mesh: Mesh, ours: Ours, rivals: Sequence[Caller], recorded: Rays, quick: bool
+) -> Iterator[report.Row]:
+    """One row per caller, ours for every query there is."""
+    callers = [*(ours.by_scene(query, 1) for query in QUERIES if answered(query)), *rivals]
+    callers += [caller for rival in rivals for caller in ours.counterparts(rival, 1) if caller.name != SCENE]
+    parts = [(recorded.origins[i : i + 1], recorded.directions[i : i + 1]) for i in range(SINGLE_RAYS)]
+    for caller in callers:
+        calls = [lambda part=part, caller=caller: caller.call(*part) for part in parts]
+        with one_core():
+            seconds = measured(calls, QUICK_SECONDS if quick else SINGLE_SECONDS)
+        p50, p99 = (float(q) for q in np.quantile(seconds, (0.5, 0.99)))
+        yield {
+            "scene": mesh.name,
+            "query": caller.query,
+            "caller": caller.name,
+            "p50_us": p50 * 1e6,
+            "p99_us": p99 * 1e6,
+            "calls": len(seconds),
+        }
+
+
+def mean_rows(rows: Sequence[report.Row]) -> list[report.Row]:
+    """Geometric mean and lowest ratio over scenes and kinds of rays, per rival and number of threads."""
+    keys = ("query", "ours", "other", "threads")
+    means = []
+    for key in dict.fromkeys(tuple(row[name] for name in keys) for row in rows):
+        group = [row for row in rows if tuple(row[name] for name in keys) == key]
+        lowest = min(group, key=lambda row: float(row["ratio"]))
+        means.append(
+            {
+                **dict(zip(keys, key, strict=True)),
+                "mean": geometric_mean([row["ratio"] for row in group]),
+                "lowest": lowest["ratio"],
+                "lowest_at": f"{lowest['scene']}, {lowest['rays']}",
+            }
+        )
+    return means
+
+
+def draw(means: Sequence[report.Row]) -> Figure:
+    """Bars of the mean ratio per rival, a colour per number of threads."""
+    rivals = list(dict.fromkeys(_label(row) for row in means))
+    threads = list(dict.fromkeys(row["threads"] for row in means))
+    figure, panel = pyplot.subplots(figsize=(9, 1.2 + 0.55 * len(rivals)), layout="constrained")
+    height = 0.8 / len(threads)
+    for i, number in enumerate(threads):
+        ratios = {_label(row): row["mean"] for row in means if row["threads"] == number}
+        places = [rivals.index(name) + (i - (len(threads) - 1) / 2) * height for name in ratios]
+        label = f"wive on {number} thread{'s' * (number > 1)}"
+        bars = panel.barh(places, list(ratios.values()), height * 0.9, label=label, color=f"C{i}")
+        panel.bar_label(bars, fmt="%.1f", fontsize=8, padding=2)
+    panel.axvline(1.0, color="0.4", linewidth=1)
+    panel.set_xscale("log")
+    panel.xaxis.set_major_formatter("{x:g}")
+    panel.xaxis.set_minor_formatter("")
+    panel.set_xlabel("the other's seconds over wive's, geometric mean over scenes and rays", fontsize=9)
+    panel.set_yticks(range(len(rivals)), rivals, fontsize=8)
+    panel.set_ylim(len(rivals) - 0.5, -0.5)
+    panel.margins(x=0.1)
+    panel.spines[["top", "right", "left"]].set_visible(False)
+    panel.legend(frameon=False, fontsize=8)
+    return figure
+
+
+def _label(row: report.Row) -> str:
+    return row["other"] if row["ours"] == SCENE else f"{row['other']}, against {row['ours']}"
+
+
+def parse_options(options: Sequence[str]) -> argparse.Namespace:
+    """The command line's choices."""
+    parser = scene_parser("python", __doc__)
+    parser.add_argument("--rays", type=listed(RAY_KINDS), default=RAY_KINDS, help=", ".join(RAY_KINDS))
+    return parser.parse_args(options)

@@ -1,0 +1,26 @@
+// Writing compressed nodes and blocks.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include "compressed.h"
+#include "emit.h"
+#include "layout.h"
+#include "mesh.h"
+
+namespace wive {
+
+struct CompressedWriter {
+    using Node = CompressedNode;
+    using Block = CompressedBlock;
+
+    // Every box of `out` holds that of `node`, in exact arithmetic. children: how many lanes are used.
+    static void write_node(const wive::Node& node, int children, Node& out);
+    static LeafSize leaf_size(const Mesh& mesh, std::span<const std::uint32_t> prims);
+    // The same for both accuracies.
+    static LeafSize write_leaf(const Mesh& mesh, Accuracy, std::span<const std::uint32_t> prims, std::byte* out);
+};
+
+}  // namespace wive
