@@ -12,7 +12,7 @@ from wive import error_bounds
 
 ACCURACIES = ("fast", "watertight", "exact")
 FLOAT_ROUNDOFF = 2.0**-24
-COUNT = 1000
+COUNT = 600
 
 Set = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]  # vertices, faces, origins, directions
 

@@ -13,7 +13,7 @@ from wive import spawn
 
 ACCURACIES = ("fast", "watertight", "exact")
 UTM = np.array([148376.0, 1234.0, -223423.0])
-COUNT = 300
+COUNT = 200
 
 # Magnitude of coordinates, size of triangles, and how far off the middle of an edge the third corner is.
 EXPONENTS = [(10.0**e, 10.0**e, 1.0) for e in range(-6, 7)]
