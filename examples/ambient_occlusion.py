@@ -11,7 +11,7 @@ import numpy as np
 import warp as wp
 
 import wive
-from wive.warp_kernels import Bvh, any_hit, check, closest_hit
+from wive.warp_kernels import Bvh, any_hit, check
 
 SAMPLES = 256
 SIDE = 24
@@ -19,20 +19,14 @@ SHADES = "@#*+=-. "
 
 
 @wp.kernel
-def sky_seen(
-    bvh: Bvh, origins: wp.array(dtype=wp.vec3), height: wp.array(dtype=float), sky: wp.array(dtype=float)
-):
-    """From each origin straight down, then from the place hit up into the hemisphere, by cosine."""
+def sky_seen(bvh: Bvh, places: wp.array(dtype=wp.vec3), sky: wp.array(dtype=float)):
+    """From each place up into the hemisphere, by cosine."""
     i = wp.tid()
-    up = wp.vec3(0.0, 0.0, 1.0)
-    hit = closest_hit(bvh, origins[i], -up, 0.0, wp.inf)
-    point = origins[i] - (hit.t - 1.0e-4) * up
-    height[i] = point[2]
     state = wp.rand_init(1, i)
     free = int(0)  # noqa: RUF046, UP018
     for _ in range(SAMPLES):
-        direction = wp.sample_unit_sphere_surface(state) + up
-        if not any_hit(bvh, point, direction, 0.0, wp.inf):
+        direction = wp.sample_unit_sphere_surface(state) + wp.vec3(0.0, 0.0, 1.0)
+        if not any_hit(bvh, places[i], direction, 0.0, wp.inf):
             free += 1
     sky[i] = float(free) / float(SAMPLES)
 
@@ -58,15 +52,16 @@ def main() -> None:
     parser.add_argument("--device", default="cpu", help="a Warp device: cpu, cuda:0, ...")
     device = parser.parse_args().device
 
-    tree = wive.Scene(*tower(), device=device).tree
+    scene = wive.Scene(*tower(), device=device)
     steps = np.linspace(-5.75, 5.75, SIDE)
-    places = np.stack([*np.meshgrid(steps, steps), np.full((SIDE, SIDE), 10.0)], axis=-1).reshape(-1, 3)
-    origins = wp.array(places, dtype=wp.vec3, device=device)
-    height, sky = (wp.zeros(len(places), dtype=float, device=device) for _ in range(2))
-    wp.launch(sky_seen, len(places), inputs=[tree.handle, origins, height, sky], device=device)
-    check(tree)
+    above = np.stack([*np.meshgrid(steps, steps), np.full((SIDE, SIDE), 10.0)], axis=-1).reshape(-1, 3)
+    hits = scene.intersect(wp.array(above, dtype=wp.vec3, device=device), (0, 0, -1))
+    places = hits.spawn((0, 0, 1))  # where rays upwards can start without hitting what was hit
+    sky = wp.zeros(len(places), dtype=float, device=device)
+    wp.launch(sky_seen, len(places), inputs=[scene.tree.handle, places, sky], device=device)
+    check(scene.tree)
     shade = np.interp(sky.numpy(), (0.5, 1), (0, len(SHADES) - 1)).astype(int).reshape(SIDE, SIDE)
-    on_ground = height.numpy().reshape(SIDE, SIDE) < 1
+    on_ground = places.numpy()[:, 2].reshape(SIDE, SIDE) < 1
     for row, ground in zip(shade, on_ground, strict=True):
         print("".join(SHADES[s] * 2 if g else "  " for s, g in zip(row, ground, strict=True)))
 

@@ -101,6 +101,23 @@ def test_hits_come_back_in_the_library_of_the_rays(scene, library):
         np.testing.assert_array_equal(library.read(found), wanted)
 
 
+def test_spawned_origins_and_error_bounds_come_back_in_the_library_of_the_rays(scene, library):
+    expected = scene.intersect(*RAYS)
+    hits = scene.intersect(*map(library.make, RAYS))
+    bounds, wanted = library.read(hits.error_bound), expected.error_bound
+    np.testing.assert_allclose(bounds, wanted, rtol=1e-6 if library.name == "jax" else 0)
+    up = np.array([0, 0, 1], np.float32)
+    for directions in (RAYS[1], up):
+        origins, wanted = hits.spawn(library.make(directions)), expected.spawn(directions)
+        np.testing.assert_array_equal(library.read(origins), wanted)
+        np.testing.assert_array_equal(library.read(hits.spawn(directions)), wanted)
+        if library.name != "dlpack":  # whose arrays from elsewhere are read-only in these tests
+            blocked = scene.occluded(origins, library.make(RAYS[1]))
+            np.testing.assert_array_equal(library.read(blocked), scene.occluded(wanted, RAYS[1]))
+    with pytest.raises(ValueError, match=r"directions must have shape \(777, 3\), one a hit, or \(3,\), got"):
+        hits.spawn(library.make(RAYS[1][:5]))
+
+
 def test_occluded_comes_back_in_the_library_of_the_rays(scene, library):
     rays = [library.make(array) for array in RAYS]
     blocked = library.read(scene.occluded(*rays, 0.25, 0.75))

@@ -12,7 +12,12 @@ ARITHMETIC = re.compile(r"\b(?:add|sub|mul|fma|mad|div|rcp|sqrt|rsqrt)\.[a-z0-9.
 
 @pytest.mark.parametrize("architecture", ARCHITECTURES)
 @pytest.mark.parametrize(
-    ("name", "kernels"), [("warp_shading", ("start_paths", "shade", "gather")), ("warp_hits", ("_points",))]
+    ("name", "kernels"),
+    [
+        ("warp_shading", ("start_paths", "shade", "gather")),
+        ("warp_hits", ("_points",)),
+        ("warp_spawn", ("_error_bounds", "_spawn_origins")),
+    ],
 )
 def test_every_operation_is_rounded_on_its_own_on_cuda(tmp_path, name, kernels, architecture):
     module = pytest.importorskip(f"wive.{name}")

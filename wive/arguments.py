@@ -125,6 +125,16 @@ def rays(
     return origin_rows, direction_rows, limits("tmin", tmin, count), limits("tmax", tmax, count)
 
 
+def directions(value: ArrayLike, count: int) -> Float32:
+    """The directions of `count` rays, (count,3) float32, C-contiguous unless all share one."""
+    rows = value if _is_ready(value) else _vectors("directions", value)
+    if rows.ndim == 1:
+        return np.broadcast_to(rows, (count, 3))
+    if len(rows) != count:
+        raise ValueError(f"directions must have shape ({count}, 3), one a hit, or (3,), got {rows.shape}")
+    return rows
+
+
 def threads(value: int | None) -> int:
     """The number of threads to use; 0 is one for each core that this process may run on."""
     if value is None:

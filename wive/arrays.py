@@ -98,9 +98,10 @@ class WarpArrays(_OnWarpStream):
         """On Warp's CPU device."""
         import warp as wp
 
-        vectors = {2: {"dtype": wp.vec2}, 3: {"dtype": wp.vec3d}}
-        as_vectors = vectors[array.shape[1]] if array.ndim == 2 and self.vectors else {}
-        return wp.array(array, device="cpu", copy=False, **as_vectors)
+        vectors = {(2, "float32"): wp.vec2, (3, "float32"): wp.vec3, (3, "float64"): wp.vec3d}
+        as_vectors = array.ndim == 2 and self.vectors
+        dtype = {"dtype": vectors[array.shape[1], array.dtype.name]} if as_vectors else {}
+        return wp.array(array, device="cpu", copy=False, **dtype)
 
     def to_warp(self, array: Any, device: str) -> Any:
         """As it is."""

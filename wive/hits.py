@@ -2,12 +2,16 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from wive.arrays import Library
+from wive import arguments
+from wive.arrays import Library, host_array
+from wive.error_bounds import t_error_bounds
+from wive.rays import Rays
+from wive.spawn import spawn_origins
 
 
 class Stats(NamedTuple):
@@ -71,6 +75,9 @@ class Hits:
     uv: NDArray[np.float32]
     vertices: NDArray[np.float32]
     faces: NDArray[np.int32]
+    # Only kept for what is asked later: class variables to the dataclass, which would make fields of them.
+    _rays: ClassVar[Rays | None]
+    _accuracy: ClassVar[str]
 
     def __init__(
         self,
@@ -79,9 +86,13 @@ class Hits:
         uv: NDArray[np.float32],
         vertices: NDArray[np.float32],
         faces: NDArray[np.int32],
+        rays: Rays | None = None,
+        accuracy: str = "",
     ) -> None:
         """Keep them; as a frozen dataclass would, in a third of the time."""
-        self.__dict__.update(t=t, prim=prim, uv=uv, vertices=vertices, faces=faces)
+        self.__dict__.update(
+            t=t, prim=prim, uv=uv, vertices=vertices, faces=faces, _rays=rays, _accuracy=accuracy
+        )
 
     @property
     def mask(self) -> NDArray[np.bool_]:
@@ -108,6 +119,43 @@ class Hits:
         normals = np.full((len(self), 3), np.nan)
         normals[hit] = surface_normals(self.vertices, self.faces, self.prim[hit])
         return normals
+
+    @property
+    def error_bound(self) -> NDArray[np.float64]:
+        """(n,) float64: t is at most so far from where the ray meets the plane of the triangle hit.
+
+        That is in exact arithmetic on the float32 rays and vertices, in the unit of t; proved for every
+        accuracy, docs/accuracy.md, "The error of t". inf where double can't tell the ray from one in the
+        plane, NaN on a miss. In float64, because what remains after t was rounded to float32 is far below
+        what a float32 of that size resolves.
+
+        Computed at each call, from the arrays that held the rays: it is wrong if you have changed them.
+        """
+        if self._rays is None:
+            raise ValueError("error_bound needs hits that a scene returned: these were made without rays")
+        origins, directions, *_ = self._rays.numpy()
+        return t_error_bounds(self.vertices, self.faces, self.prim, self.t, origins, directions)
+
+    def spawn(self, directions: ArrayLike) -> NDArray[np.float32]:
+        """(n,3) float32 origins for rays that leave the surface from the points hit; NaN on a miss.
+
+        Each lies on the side of its triangle that its direction points to, just far enough that a ray from
+        there with tmin = 0 doesn't hit this triangle in a scene of the same accuracy; docs/accuracy.md,
+        "Spawned rays", has the proof, and what holds for neighbours. All directions to one side have the
+        same origin. Rays from the NaN of a miss miss.
+
+        Arguments:
+            directions: (n,3) real numbers, used as float32, or (3,) for all; of any length. On a Warp
+                device, as `Scene.intersect` takes them.
+
+        Raises ValueError or TypeError, in one line naming the argument.
+
+        >>> blocked = scene.occluded(hits.spawn(to_light), to_light, tmax=1)
+        """
+        if not self._accuracy:
+            raise ValueError("spawn needs hits that a scene returned: these were made without an accuracy")
+        rows = arguments.directions(host_array("directions", directions), len(self))
+        return spawn_origins(self.vertices, self.faces, self.prim, self.uv, rows, self._accuracy)
 
     def __len__(self) -> int:
         """Number of rays."""
@@ -142,6 +190,15 @@ class WrappedHits(Hits):
     def normals(self) -> Any:
         """(n,3) float64 unit normals, as `Hits.normals`."""
         return self._wrap(self._home.normals())
+
+    @property
+    def error_bound(self) -> Any:
+        """(n,) float64, as `Hits.error_bound`."""
+        return self._wrap(self._home.error_bound)
+
+    def spawn(self, directions: ArrayLike) -> Any:
+        """(n,3) float32 origins, as `Hits.spawn`."""
+        return self._wrap(self._home.spawn(directions))
 
     def __len__(self) -> int:
         """Number of rays."""

@@ -151,7 +151,8 @@ class Scene(Refittable, CrossingQueries):
         else:
             bvh = self._bvh
             t, prim, uv, table = bvh.intersect(self._backend, *rays.numpy(), *work)
-            hits, counts = Hits(t, prim, uv, bvh.vertices, self._faces), stats_of(table, rays.library)
+            hits = Hits(t, prim, uv, bvh.vertices, self._faces, rays, self._options["accuracy"])
+            counts = stats_of(table, rays.library)
             if rays.library is not NUMPY:
                 hits = WrappedHits(hits, rays.library.from_numpy)
         return hits if counts is None else (hits, counts)

@@ -63,6 +63,30 @@ class RayLoader:
             self._limit("tmax", rays.tmax, count),
         )
 
+    def directions(self, value: Any, count: int) -> Any:
+        """(count,) vec3 of directions (count,3), or (3,) for all; NumPy's are copied to the device."""
+        library = library_of(value)
+        if library is NUMPY:
+            rows = arguments.directions(value, count)
+            if rows.strides[0] == 0:
+                one = wp.array(rows[:1], dtype=wp.vec3, device=self.device)
+                return _vec3_view(one, count, 0)
+            return wp.array(rows, dtype=wp.vec3, device=self.device, copy=False)
+        place = library.device(value)
+        if place not in (self.device, None if self.device != "cpu" else self.device):
+            raise ValueError(
+                f"directions must be on the device of the hits, {self.device}, got an array on {place}: "
+                "copy it there"
+            )
+        array, shared = self._vectors("directions", value)
+        if shared:
+            return _vec3_view(array, count, 0)
+        if len(array) != count:
+            raise ValueError(
+                f"directions must have shape ({count}, 3), one a hit, or (3,), got {(len(array), 3)}"
+            )
+        return array
+
     def _vectors(self, name: str, value: Any) -> tuple[Any, bool]:
         """(n,) vec3 and False, or the (1,) that all rays share and True."""
         library = library_of(value)

@@ -12,7 +12,6 @@ from wive.arrays import NUMPY
 from wive.hits import Hits, Stats, WrappedHits
 from wive.rays import Rays
 from wive.warp_all_hits import WarpAllHits
-from wive.warp_hits import WarpHits
 from wive.warp_kernels import (
     MOST_HITS,
     check,
@@ -24,6 +23,7 @@ from wive.warp_kernels import (
     upload,
 )
 from wive.warp_rays import RayLoader, WarpRays
+from wive.warp_spawn import WarpClosestHits
 
 # Below it eight threads a ray keep a GPU busy and answer sooner; above it one thread a ray answers more.
 # An estimate from a prototype; `python -m bench latency --lanes 1,8` on a GPU measures it.
@@ -45,6 +45,7 @@ class WarpTracer:
         self.tree = upload(bvh, device)
         self.device = device
         self._vertices, self._faces = vertices, faces
+        self._accuracy = bvh.accuracy
         self._loader = RayLoader(device)
 
     def intersect(self, rays: Rays, lanes: Lanes | None, stats: bool) -> tuple[Hits, Stats | None]:
@@ -58,9 +59,11 @@ class WarpTracer:
             )
             if rays.library is NUMPY:
                 check(self.tree)
-                hits = Hits(t.numpy(), prim.numpy(), uv.numpy(), self._vertices, self._faces)
+                found = t.numpy(), prim.numpy(), uv.numpy()
+                hits = Hits(*found, self._vertices, self._faces, rays, self._accuracy)
                 return hits, _numpy_stats(counts)
-            inner = WarpHits(t, prim, uv, self._vertices, self._faces, self.mesh)
+            found = t, prim, uv
+            inner = WarpClosestHits(*found, self._vertices, self._faces, self.mesh, loaded, self._accuracy)
             return WrappedHits(inner, rays.library.from_warp), _stats(counts, rays)
 
     def occluded(self, rays: Rays, lanes: Lanes | None, stats: bool) -> tuple[Any, Stats | None]:
