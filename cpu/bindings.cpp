@@ -1,44 +1,20 @@
-// The Python face of the core. Arguments are checked in Python (wive/scene.py); here only what memory safety needs.
-#include <pybind11/numpy.h>
-#include <pybind11/pybind11.h>
-#include <pybind11/stl.h>
-
-#include <memory>
+// The Python face of the core: the tree and the renderer.
 #include <optional>
 #include <span>
-#include <stdexcept>
-#include <string>
-#include <utility>
 
-#include "builder.h"
+#include "bindings.h"
 #include "dispatch.h"
-#include "gather.h"
 #include "parallel.h"
 #include "render.h"
-#include "trace.h"
-
-namespace py = pybind11;
 
 namespace wive {
 namespace {
-
-template <class T>
-using Array = py::array_t<T, py::array::c_style>;
 
 #if defined(__clang__)
 constexpr const char* compiler_name = "clang " __clang_version__;
 #else
 constexpr const char* compiler_name = "gcc " __VERSION__;
 #endif
-
-void expect(bool condition, const char* message) {
-    if (!condition) throw std::invalid_argument(message);
-}
-
-template <class T>
-void expect_shape(const Array<T>& array, py::ssize_t columns, const char* message) {
-    expect(array.ndim() == 2 && array.shape(1) == columns, message);
-}
 
 Accuracy parse_accuracy(const std::string& name) {
     if (name == "fast") return Accuracy::fast;
@@ -71,148 +47,12 @@ Quality parse_quality(const std::string& name) {
     return Quality::medium;
 }
 
-// The tree together with the arrays it was built from, which rendering reads.
-class PyBvh {
-public:
-    PyBvh(Array<float> vertices, Array<std::int32_t> faces, const std::string& accuracy, const std::string& order,
-          unsigned threads, int depth_limit, const std::string& nodes, const std::string& quality)
-        : vertices_(std::move(vertices)), faces_(std::move(faces)) {
-        expect_shape(vertices_, 3, "vertices: expected shape (v, 3)");
-        expect_shape(faces_, 3, "faces: expected shape (f, 3)");
-        expect(depth_limit >= 1 && depth_limit <= max_depth, "depth_limit: expected 1 to 64");
-        options_ = {parse_accuracy(accuracy), parse_nodes(nodes), parse_order(order),
-                    threads,                  depth_limit,        parse_quality(quality)};
-        const Mesh view = mesh();
-        py::gil_scoped_release release;
-        bvh_ = std::make_unique<Bvh>(view, options_);
-    }
-
-    // The same faces over moved vertices. Where the tree can't be kept it is built anew.
-    PyBvh(const PyBvh& other, Array<float> vertices, unsigned threads)
-        : vertices_(std::move(vertices)), faces_(other.faces_), options_(other.options_) {
-        expect_shape(vertices_, 3, "vertices: expected shape (v, 3)");
-        options_.threads = threads;
-        const Mesh view = mesh();
-        py::gil_scoped_release release;
-        bvh_ = other.bvh_->refitted(view, threads);
-        if (!bvh_) bvh_ = std::make_unique<Bvh>(view, options_);
-    }
-
-    const Bvh& bvh() const { return *bvh_; }
-    const Array<float>& vertices() const { return vertices_; }
-    Mesh mesh() const {
-        return {vertices_.data(), static_cast<std::size_t>(vertices_.shape(0)), faces_.data(),
-                static_cast<std::size_t>(faces_.shape(0))};
-    }
-
-private:
-    Array<float> vertices_;
-    Array<std::int32_t> faces_;
-    BuildOptions options_;
-    std::unique_ptr<Bvh> bvh_;
-};
-
-struct Rays {
-    RayBatch batch;
-    std::size_t count;
-};
-
-Rays ray_batch(const Array<float>& origins, const Array<float>& directions, const Array<float>& tmin,
-               const Array<float>& tmax) {
-    expect_shape(origins, 3, "origins: expected shape (n, 3)");
-    expect_shape(directions, 3, "directions: expected shape (n, 3)");
-    const py::ssize_t n = origins.shape(0);
-    expect(directions.shape(0) == n, "directions: expected as many as origins");
-    expect(tmin.size() == 1 || tmin.size() == n, "tmin: expected one value or one a ray");
-    expect(tmax.size() == 1 || tmax.size() == n, "tmax: expected one value or one a ray");
-    const auto stride = [](const Array<float>& a) { return static_cast<std::size_t>(a.size() == 1 ? 0 : 1); };
-    return {{origins.data(), directions.data(), tmin.data(), tmax.data(), stride(tmin), stride(tmax)},
-            static_cast<std::size_t>(n)};
-}
-
-// Traces the rays with the interpreter lock released.
-void trace_released(const PyBvh& self, const std::string& kernel, QueryKind query, const Rays& rays,
-                    const HitBatch& hits, unsigned threads, unsigned in_flight) {
-    const KernelTable& table = find_kernels(kernel);
-    const TraceBatch batch = table.find({query, self.bvh().accuracy(), self.bvh().node_form(), hits.stats != nullptr});
-    const BvhView bvh = self.bvh().view();
-    py::gil_scoped_release release;
-    trace(table, batch, bvh, rays.batch, hits, rays.count, threads, in_flight);
-}
-
-py::tuple intersect(const PyBvh& self, const std::string& kernel, const Array<float>& origins,
-                    const Array<float>& directions, const Array<float>& tmin, const Array<float>& tmax, unsigned threads,
-                    unsigned in_flight, bool stats) {
-    const Rays rays = ray_batch(origins, directions, tmin, tmax);
-    const py::ssize_t n = origins.shape(0);
-    Array<float> t(n), uv({n, py::ssize_t{2}});
-    Array<std::int32_t> prim(n);
-    std::optional<Array<std::int32_t>> steps;
-    HitBatch hits;
-    hits.t = t.mutable_data();
-    hits.prim = prim.mutable_data();
-    hits.uv = uv.mutable_data();
-    if (stats) hits.stats = steps.emplace(std::vector<py::ssize_t>{n, 3}).mutable_data();
-    trace_released(self, kernel, QueryKind::closest, rays, hits, threads, in_flight);
-    return py::make_tuple(std::move(t), std::move(prim), std::move(uv), std::move(steps));
-}
-
-py::tuple occluded(const PyBvh& self, const std::string& kernel, const Array<float>& origins,
-                   const Array<float>& directions, const Array<float>& tmin, const Array<float>& tmax, unsigned threads,
-                   unsigned in_flight, bool stats) {
-    const Rays rays = ray_batch(origins, directions, tmin, tmax);
-    const py::ssize_t n = origins.shape(0);
-    Array<bool> mask(n);
-    std::optional<Array<std::int32_t>> steps;
-    HitBatch hits;
-    hits.occluded = mask.mutable_data();
-    if (stats) hits.stats = steps.emplace(std::vector<py::ssize_t>{n, 3}).mutable_data();
-    trace_released(self, kernel, QueryKind::any, rays, hits, threads, in_flight);
-    return py::make_tuple(std::move(mask), std::move(steps));
-}
-
-py::tuple count(const PyBvh& self, const std::string& kernel, const Array<float>& origins,
-                const Array<float>& directions, const Array<float>& tmin, const Array<float>& tmax, unsigned threads,
-                unsigned in_flight, bool stats) {
-    const Rays rays = ray_batch(origins, directions, tmin, tmax);
-    const py::ssize_t n = origins.shape(0);
-    Array<std::int32_t> counts(n);
-    std::optional<Array<std::int32_t>> steps;
-    HitBatch hits;
-    hits.count = counts.mutable_data();
-    if (stats) hits.stats = steps.emplace(std::vector<py::ssize_t>{n, 3}).mutable_data();
-    trace_released(self, kernel, QueryKind::count, rays, hits, threads, in_flight);
-    return py::make_tuple(std::move(counts), std::move(steps));
-}
-
-py::tuple intersect_all(const PyBvh& self, const std::string& kernel, const Array<float>& origins,
-                        const Array<float>& directions, const Array<float>& tmin, const Array<float>& tmax,
-                        unsigned threads, unsigned in_flight, bool stats) {
-    const Rays rays = ray_batch(origins, directions, tmin, tmax);
-    const py::ssize_t n = origins.shape(0);
-    Array<std::int64_t> offsets(n + 1);
-    std::optional<Array<std::int32_t>> steps;
-    std::int32_t* steps_data = stats ? steps.emplace(std::vector<py::ssize_t>{n, 3}).mutable_data() : nullptr;
-    const KernelTable& table = find_kernels(kernel);
-    const TraceBatch batch = table.find({QueryKind::all, self.bvh().accuracy(), self.bvh().node_form(), stats});
-    const BvhView bvh = self.bvh().view();
-    std::int64_t* offsets_data = offsets.mutable_data();
-    std::optional<Gathering> gathering;
-    {
-        py::gil_scoped_release release;
-        gathering.emplace(table, batch, bvh, rays.batch, rays.count, steps_data, threads, in_flight);
-        gathering->write_offsets(offsets_data);
-    }
-    const auto total = static_cast<py::ssize_t>(offsets_data[n]);
-    Array<float> t(total), uv({total, py::ssize_t{2}});
-    Array<std::int32_t> prim(total);
-    const SortedHits hits = {offsets_data, t.mutable_data(), prim.mutable_data(), uv.mutable_data()};
-    {
-        py::gil_scoped_release release;
-        gathering->sort_into(hits);
-        gathering.reset();  // long lists take a while to free
-    }
-    return py::make_tuple(std::move(offsets), std::move(t), std::move(prim), std::move(uv), std::move(steps));
+std::unique_ptr<PyBvh> build(Array<float> vertices, Array<std::int32_t> faces, const std::string& accuracy,
+                             const std::string& order, unsigned threads, int depth_limit, const std::string& nodes,
+                             const std::string& quality) {
+    const BuildOptions options = {parse_accuracy(accuracy), parse_nodes(nodes), parse_order(order),
+                                  threads,                  depth_limit,        parse_quality(quality)};
+    return std::make_unique<PyBvh>(std::move(vertices), std::move(faces), options);
 }
 
 // Function and context as ctypes gives their addresses.
@@ -276,7 +116,7 @@ py::array_t<float> copy(const std::array<float, n>& values) {
 }  // namespace
 }  // namespace wive
 
-PYBIND11_MODULE(_cpu, m, py::mod_gil_not_used()) {
+PYBIND11_MODULE(_cpu, m, pybind11::mod_gil_not_used()) {
     using namespace wive;
     m.doc() = "The compiled core of wive.";
     m.attr("compiler") = compiler_name;
@@ -285,16 +125,13 @@ PYBIND11_MODULE(_cpu, m, py::mod_gil_not_used()) {
         for (const auto& [name, reason] : list_kernels()) names[py::str(name)] = reason;
         return names;
     });
-    const auto array = [](const char* name) { return py::arg(name).noconvert(); };
-    py::class_<PyBvh>(m, "Bvh")
-        .def(py::init<Array<float>, Array<std::int32_t>, const std::string&, const std::string&, unsigned, int,
-                      const std::string&, const std::string&>(),
-             array("vertices"), array("faces"), py::arg("accuracy") = "watertight", py::arg("order") = "treelet",
-             py::arg("threads") = 0, py::arg("depth_limit") = max_depth, py::arg("nodes") = "float32",
+    PyBvhClass bvh(m, "Bvh");
+    bvh.def(py::init(&build), array_arg("vertices"), array_arg("faces"), py::arg("accuracy") = "watertight", py::arg("order") = "treelet",
+            py::arg("threads") = 0, py::arg("depth_limit") = max_depth, py::arg("nodes") = "float32",
              py::arg("quality") = "medium")
         .def("refitted", [](const PyBvh& self, const Array<float>& vertices, unsigned threads) {
             return std::make_unique<PyBvh>(self, vertices, threads);
-        }, array("vertices"), py::arg("threads") = 0)
+        }, array_arg("vertices"), py::arg("threads") = 0)
         .def_property_readonly("vertices", &PyBvh::vertices)
         .def_property_readonly("nodes", [](py::object self) {
             const Bvh& bvh = self.cast<const PyBvh&>().bvh();
@@ -335,15 +172,9 @@ PYBIND11_MODULE(_cpu, m, py::mod_gil_not_used()) {
             const Bvh::Sah sah = self.bvh().sah();
             return py::make_tuple(sah.nodes, sah.blocks);
         })
-        .def("intersect", &intersect, py::arg("kernel"), array("origins"), array("directions"), array("tmin"),
-             array("tmax"), py::arg("threads") = 0, py::arg("in_flight") = 0, py::arg("stats") = false)
-        .def("occluded", &occluded, py::arg("kernel"), array("origins"), array("directions"), array("tmin"),
-             array("tmax"), py::arg("threads") = 0, py::arg("in_flight") = 0, py::arg("stats") = false)
-        .def("intersect_all", &intersect_all, py::arg("kernel"), array("origins"), array("directions"), array("tmin"),
-             array("tmax"), py::arg("threads") = 0, py::arg("in_flight") = 0, py::arg("stats") = false)
-        .def("count", &count, py::arg("kernel"), array("origins"), array("directions"), array("tmin"),
-             array("tmax"), py::arg("threads") = 0, py::arg("in_flight") = 0, py::arg("stats") = false)
-        .def("render_rows", &render, py::arg("kernel"), array("camera"), array("image"), py::arg("row_begin"),
+        .def("render_rows", &render, py::arg("kernel"), array_arg("camera"), array_arg("image"), py::arg("row_begin"),
              py::arg("row_end"), py::arg("samples"), py::arg("bounces"), py::arg("albedo"), py::arg("seed") = 0,
              py::arg("threads") = 0, py::arg("in_flight") = 0, py::arg("tracer") = py::none());
+    bind_queries(bvh);
+    bind_surface(m);
 }

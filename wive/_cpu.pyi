@@ -172,3 +172,13 @@ class Bvh:
         threads or kernel. tracer: addresses of a C function that traces in the kernel's place and of its
         context (ForeignTracer in cpu/render.h), for comparisons.
         """
+
+def surface_points(
+    vertices: NDArray[np.float32], faces: NDArray[np.int32], prim: NDArray[np.int32], uv: NDArray[np.float32]
+) -> NDArray[np.float64]:
+    """(n,3) points at uv (n,2) of triangles prim (n,), in double; NaN where there is no such triangle."""
+
+def surface_normals(
+    vertices: NDArray[np.float32], faces: NDArray[np.int32], prim: NDArray[np.int32]
+) -> NDArray[np.float64]:
+    """(n,3) unit normals of triangles prim (n,), in double; NaN where there is no such triangle."""

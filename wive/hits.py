@@ -7,7 +7,7 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from wive import arguments
+from wive import _cpu, arguments
 from wive.arrays import Library, host_array
 from wive.error_bounds import t_error_bounds
 from wive.rays import Rays
@@ -32,27 +32,15 @@ def stats_of(table: NDArray[np.int32] | None, library: Library) -> Stats | None:
 def surface_points(
     vertices: NDArray[np.float32], faces: NDArray[np.int32], prim: NDArray[np.int32], uv: NDArray[np.float32]
 ) -> NDArray[np.float64]:
-    """(h,3) points at uv (h,2) of triangles prim (h,)."""
-    v0, v1, v2 = _corners(vertices, faces, prim)
-    u, v = uv.astype(np.float64).T[:, :, None]
-    points: NDArray[np.float64] = (1 - u - v) * v0 + u * v1 + v * v2
-    return points
+    """(h,3) points at uv (h,2) of triangles prim (h,); NaN where prim is -1."""
+    return _cpu.surface_points(vertices, faces, np.ascontiguousarray(prim), np.ascontiguousarray(uv))
 
 
 def surface_normals(
     vertices: NDArray[np.float32], faces: NDArray[np.int32], prim: NDArray[np.int32]
 ) -> NDArray[np.float64]:
-    """(h,3) unit normals of triangles prim (h,), by the right-hand winding."""
-    v0, v1, v2 = _corners(vertices, faces, prim)
-    across = np.cross(v1 - v0, v2 - v0)
-    normals: NDArray[np.float64] = across / np.linalg.norm(across, axis=1, keepdims=True)
-    return normals
-
-
-def _corners(
-    vertices: NDArray[np.float32], faces: NDArray[np.int32], prim: NDArray[np.int32]
-) -> NDArray[np.float64]:
-    return vertices[faces[prim]].astype(np.float64).swapaxes(0, 1)
+    """(h,3) unit normals of triangles prim (h,), by the right-hand winding; NaN where prim is -1."""
+    return _cpu.surface_normals(vertices, faces, np.ascontiguousarray(prim))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -105,20 +93,14 @@ class Hits:
         Computed at each call, in float64: rounding to float32 would move points off triangles that lie far
         from the origin.
         """
-        hit = self.mask
-        points = np.full((len(self), 3), np.nan)
-        points[hit] = surface_points(self.vertices, self.faces, self.prim[hit], self.uv[hit])
-        return points
+        return surface_points(self.vertices, self.faces, self.prim, self.uv)
 
     def normals(self) -> NDArray[np.float64]:
         """(n,3) float64 unit normals of the triangles hit, by the right-hand winding; NaN on a miss.
 
         Computed at each call. The normal is the triangle's, whichever side the ray came from.
         """
-        hit = self.mask
-        normals = np.full((len(self), 3), np.nan)
-        normals[hit] = surface_normals(self.vertices, self.faces, self.prim[hit])
-        return normals
+        return surface_normals(self.vertices, self.faces, self.prim)
 
     @property
     def error_bound(self) -> NDArray[np.float64]:

@@ -1,0 +1,78 @@
+// Points and normals of hits, computed when they are asked for.
+#include <cmath>
+
+#include "bindings.h"
+#include "parallel.h"
+
+namespace wive {
+namespace {
+
+constexpr std::size_t hits_per_chunk = 1 << 12;
+
+// Calls row(i, corners of hit i, three values of the answer) for every hit, in double, on every core.
+template <class Row>
+py::array_t<double> each_hit(const Array<float>& vertices, const Array<std::int32_t>& faces, const Array<std::int32_t>& prim,
+                             const Row& row) {
+    expect_shape(vertices, 3, "vertices: expected shape (v, 3)");
+    expect_shape(faces, 3, "faces: expected shape (f, 3)");
+    const py::ssize_t count = prim.size();
+    py::array_t<double> answer({count, py::ssize_t{3}});
+    double* out = answer.mutable_data();
+    const std::int32_t *prims = prim.data(), *corners = faces.data();
+    const float* points = vertices.data();
+    const auto face_count = static_cast<std::size_t>(faces.shape(0)), point_count = static_cast<std::size_t>(vertices.shape(0));
+    const auto hits = static_cast<std::size_t>(count);
+    py::gil_scoped_release release;
+    Threads threads(hits > hits_per_chunk ? thread_count(0) : 1);
+    parallel_chunks(hits, hits_per_chunk, threads, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i < end; ++i) {
+            const auto face = static_cast<std::size_t>(static_cast<std::uint32_t>(prims[i]));
+            double corner[3][3] = {};
+            bool known = face < face_count;
+            for (std::size_t k = 0; known && k < 3; ++k) {
+                const auto vertex = static_cast<std::size_t>(static_cast<std::uint32_t>(corners[3 * face + k]));
+                known = vertex < point_count;  // the arrays are the caller's, who may have changed them since
+                for (std::size_t axis = 0; known && axis < 3; ++axis) corner[k][axis] = points[3 * vertex + axis];
+            }
+            row(i, known, corner, out + 3 * i);
+        }
+    });
+    return answer;
+}
+
+constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+
+py::array_t<double> points(const Array<float>& vertices, const Array<std::int32_t>& faces, const Array<std::int32_t>& prim,
+                           const Array<float>& uv) {
+    expect_shape(uv, 2, "uv: expected shape (n, 2)");
+    expect(uv.shape(0) == prim.size(), "uv: expected as many as prim");
+    const float* weights = uv.data();
+    return each_hit(vertices, faces, prim, [=](std::size_t i, bool known, const double (&corner)[3][3], double* out) {
+        const double u = weights[2 * i], v = weights[2 * i + 1];
+        for (int axis = 0; axis < 3; ++axis)
+            out[axis] = known ? (1 - u - v) * corner[0][axis] + u * corner[1][axis] + v * corner[2][axis] : nan;
+    });
+}
+
+py::array_t<double> normals(const Array<float>& vertices, const Array<std::int32_t>& faces,
+                            const Array<std::int32_t>& prim) {
+    return each_hit(vertices, faces, prim, [](std::size_t, bool known, const double (&corner)[3][3], double* out) {
+        double a[3], b[3];
+        for (int axis = 0; axis < 3; ++axis) {
+            a[axis] = corner[1][axis] - corner[0][axis];
+            b[axis] = corner[2][axis] - corner[0][axis];
+        }
+        const double across[3] = {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+        const double length = std::sqrt(across[0] * across[0] + across[1] * across[1] + across[2] * across[2]);
+        for (int axis = 0; axis < 3; ++axis) out[axis] = known ? across[axis] / length : nan;
+    });
+}
+
+}  // namespace
+
+void bind_surface(py::module_& m) {
+    m.def("surface_points", &points, array_arg("vertices"), array_arg("faces"), array_arg("prim"), array_arg("uv"));
+    m.def("surface_normals", &normals, array_arg("vertices"), array_arg("faces"), array_arg("prim"));
+}
+
+}  // namespace wive
