@@ -12,7 +12,7 @@ from types import SimpleNamespace
 
 import warp as wp
 
-from wive.warp_kernels import triangle_fast, triangle_watertight
+from wive.warp_kernels import triangle_exact, triangle_fast, triangle_watertight
 from wive.warp_kernels.frame import RayFrame, is_negative
 from wive.warp_kernels.handle import (
     ALL_BITS,
@@ -21,6 +21,7 @@ from wive.warp_kernels.handle import (
     CORRUPT,
     END_OF_STACK,
     HANDLES,
+    NO_PRIM,
     NODE_WIDTH,
     PRIM_ROW,
     SIGN_BIT,
@@ -29,11 +30,14 @@ from wive.warp_kernels.handle import (
 from wive.warp_kernels.lanes import address_of, lanes_of, load_float, lowest_lane, without_gradient
 from wive.warp_kernels.query import QUERIES, Best
 from wive.warp_kernels.query_all import Crossings
+from wive.warp_kernels.query_exact import EXACT_QUERIES, ExactBest, ExactLeaf, ExactTraversal
 from wive.warp_kernels.slabs import make_visit
+from wive.warp_kernels.triangle_exact import make_exact_leaf_test
 
 TRIANGLES = {
     "fast": (triangle_fast.fast_triangles, triangle_fast.KEPT_WORDS),
     "watertight": (triangle_watertight.watertight_triangles, triangle_watertight.KEPT_WORDS),
+    "exact": (triangle_exact.exact_triangles, triangle_exact.KEPT_WORDS),
 }
 
 
@@ -77,7 +81,8 @@ def unsortable(key: wp.uint32):
 def make_traversal(query: str, accuracy: str, length: int, entries: int, counters: bool) -> wp.Function:
     """The traversal for one query, accuracy and lane form; that many stack entries must do for the tree."""
     traverse_from = make_traversal_from(query, accuracy, length, entries, counters)
-    begin, tree_type, state_type = QUERIES[query].begin, HANDLES[accuracy], STATES[QUERIES[query].state]
+    asked = query_of(query, accuracy)
+    begin, tree_type, state_type = asked.begin, HANDLES[accuracy], STATES[asked.state]
 
     @without_gradient
     @wp.func
@@ -90,15 +95,21 @@ def make_traversal(query: str, accuracy: str, length: int, entries: int, counter
 @functools.cache
 def make_traversal_from(query: str, accuracy: str, length: int, entries: int, counters: bool) -> wp.Function:
     """The same, beginning with what its last argument holds."""
-    asked = QUERIES[query]
+    asked = query_of(query, accuracy)
     in_order: bool = asked.in_order
     make_triangles, kept_words = TRIANGLES[accuracy]
     lanes = lanes_of(length, entries, in_order, kept_words)
     triangles = make_triangles(lanes, entries * (2 if in_order else 1))
     visit = make_visit(lanes, entries, in_order)
-    test_leaf = make_leaf_test(asked, lanes, triangles)
+    if accuracy == "exact":
+        test_leaf = make_exact_leaf_test(asked, lanes, triangles, LEAVES[asked.state])
+    else:
+        test_leaf = make_leaf_test(asked, lanes, triangles)
     tree_type, best_type, state_type = HANDLES[accuracy], asked.state, STATES[asked.state]
     one_is_enough: bool = asked.one_is_enough
+    # Where a ray's threads may hold hits whose t round to the same float, they settle which is the best.
+    settles: bool = asked.state is ExactBest and length == 1
+    settle = triangles.settle if settles else None
     done = asked.done
     prepare = triangles.prepare
     new_stack, sync = lanes.new_stack, lanes.sync
@@ -161,6 +172,10 @@ def make_traversal_from(query: str, accuracy: str, length: int, entries: int, co
                     top -= 1
                     child = wp.cast(load_word(stack, top), wp.int32)
             sync()
+        if wp.static(settles):
+            state.best = settle(units, stack, lane, state.best)
+            own = wp.where(state.best.prim == wp.static(NO_PRIM), wp.inf, state.best.t)
+            state.tmax = unsortable(min_reduce(sortable(own)))
         return state
 
     return traverse_from
@@ -194,8 +209,13 @@ class CrossedLeaf:
 
 
 # What a traversal and a leaf's test return, by what the query keeps.
-STATES = {Best: Traversal, Crossings: Crossed}
-LEAVES = {Best: TestedLeaf, Crossings: CrossedLeaf}
+STATES = {Best: Traversal, Crossings: Crossed, ExactBest: ExactTraversal}
+LEAVES = {Best: TestedLeaf, Crossings: CrossedLeaf, ExactBest: ExactLeaf}
+
+
+def query_of(query: str, accuracy: str) -> SimpleNamespace:
+    """What is asked of a tree of that accuracy."""
+    return (EXACT_QUERIES if accuracy == "exact" else QUERIES)[query]
 
 
 def make_leaf_test(asked: SimpleNamespace, lanes: SimpleNamespace, triangles: SimpleNamespace) -> wp.Function:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from wive import _cpu
 from wive.warp_kernels.handle import (
+    ACCURACIES,
     CORRUPT,
     HANDLES,
     NODE_WIDTH,
@@ -25,7 +26,7 @@ STACK_SIZES = (32, 64, 96, 128, 256, 512)  # kernels are compiled for the least 
 _REASONS = {
     CORRUPT: "a traversal left the tree or did not end: the tree's memory was overwritten",
     STACK_TOO_SMALL: "the tree is too deep for closest_hit and any_hit; use launch_closest and launch_any",
-    WRONG_ACCURACY: "a fast tree's handle was given to a kernel that takes Bvh, or the other way round",
+    WRONG_ACCURACY: "the handle of a tree was given to a kernel that takes that of another accuracy",
 }
 
 
@@ -37,7 +38,7 @@ class CorruptTreeError(RuntimeError):
 class Tree:
     """A tree on a Warp device, made by `upload`.
 
-    `handle` is what kernels take: a `Bvh`, or a `FastBvh` where accuracy is "fast". `stack` is the number of
+    `handle` is what kernels take: a `Bvh`, a `FastBvh` or an `ExactBvh`, by accuracy. `stack` is the number of
     stack entries its kernels are compiled for. `memory` counts bytes on the device.
     """
 
@@ -77,7 +78,7 @@ def upload(bvh: _cpu.Bvh, device: wp.DeviceLike = None) -> Tree:
         len(bvh.units) // 5 + 1
     )  # a node is eight units, a leaf at least five, and none is met twice
     handle.stack = needed
-    handle.watertight = int(bvh.accuracy == "watertight")
+    handle.accuracy = ACCURACIES.index(bvh.accuracy)
     stack = next(size for size in STACK_SIZES if size >= needed)
     return Tree(device=place, accuracy=bvh.accuracy, handle=handle, units=units, error=error, stack=stack)
 
