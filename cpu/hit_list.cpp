@@ -12,7 +12,6 @@ constexpr std::size_t first_chunk = 256, largest_chunk = std::size_t{1} << 20;
 
 HitList::HitList() = default;
 HitList::~HitList() = default;
-HitList::HitList(HitList&&) noexcept = default;
 
 void HitList::grow() {
     const std::size_t size = chunks_.empty() ? first_chunk : std::min(2 * chunks_.back().size(), largest_chunk);

@@ -23,7 +23,6 @@ class alignas(64) HitList {
 public:
     HitList();
     ~HitList();
-    HitList(HitList&&) noexcept;
 
     // Throws std::bad_alloc, with the list as it was.
     [[gnu::always_inline]] void add(const FoundHit& hit) {

@@ -96,6 +96,7 @@ template <class Query, class Isa>
         return {ray.tmin, ray.tmax};
 }
 
+// Comes with what is asked in `result` and leaves the answer there; meanwhile it is in registers.
 template <class Isa, template <class> class Slabs, template <class> class Triangles, class Query, class Counters>
 [[gnu::noinline]] void traverse(const BvhView& bvh, const typename Triangles<Isa>::Frame& ray, Query& result,
                                 Counters& counters) {

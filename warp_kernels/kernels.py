@@ -25,7 +25,7 @@ def value_of(values: wp.array(dtype=wp.float32), i: int):
 
 
 @functools.cache
-def closest_kernel(accuracy: str, length: int, stack: int, counters: bool) -> wp.Kernel:
+def closest_kernel(accuracy: str, length: int, stack: int, counters: bool = False) -> wp.Kernel:
     """The kernel behind `launch_closest`, of dimensions (n, 8 // length)."""
     traverse = make_traversal("closest", accuracy, length, stack, counters)
     state_type = STATES[query_of("closest", accuracy).state]
@@ -76,7 +76,7 @@ def closest_kernel(accuracy: str, length: int, stack: int, counters: bool) -> wp
 
 
 @functools.cache
-def any_kernel(accuracy: str, length: int, stack: int, counters: bool) -> wp.Kernel:
+def any_kernel(accuracy: str, length: int, stack: int, counters: bool = False) -> wp.Kernel:
     """The kernel behind `launch_any`, of dimensions (n, 8 // length)."""
     traverse = make_traversal("any", accuracy, length, stack, counters)
     or_reduce, _ = reductions(length)

@@ -28,7 +28,7 @@ def address_of_number(left: wp.array(dtype=wp.int32), i: int) -> wp.uint64:
 
 
 @functools.cache
-def count_kernel(accuracy: str, length: int, stack: int, counters: bool) -> wp.Kernel:
+def count_kernel(accuracy: str, length: int, stack: int, counters: bool = False) -> wp.Kernel:
     """The kernel behind `launch_count`, of dimensions (n, 8 // length)."""
     traverse = make_traversal("count", accuracy, length, stack, counters)
     or_reduce, _ = reductions(length)

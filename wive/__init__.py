@@ -17,6 +17,7 @@ except ImportError as error:
         "install with `pip install .` and don't import wive from inside its source folder"
     ) from error
 
+from wive import trimesh
 from wive.all_hits import AllHits
 from wive.backend import Backend, backends
 from wive.camera import Camera
@@ -38,4 +39,5 @@ __all__ = [
     "load",
     "load_mesh",
     "render",
+    "trimesh",
 ]

@@ -43,7 +43,7 @@ class AllHits:
     @property
     def ray(self) -> NDArray[np.int64]:
         """(h,) int64 ray of each hit; computed at each call."""
-        return np.repeat(np.arange(len(self)), np.diff(self.offsets))
+        return np.repeat(np.arange(len(self), dtype=np.int64), np.diff(self.offsets))
 
     def points(self) -> NDArray[np.float64]:
         """(h,3) float64 hit points from the barycentrics, as `Hits.points`; computed at each call."""
@@ -61,7 +61,7 @@ class AllHits:
         """The hits of ray i, views of the same arrays; IndexError where there is no such ray."""
         first, last = (int(offset) for offset in self.offsets[row_of(i, len(self)) :][:2])
         rows = slice(first, last)
-        offsets = np.array([0, last - first])
+        offsets = np.array([0, last - first], np.int64)
         return AllHits(offsets, self.t[rows], self.prim[rows], self.uv[rows], self.vertices, self.faces)
 
     def __iter__(self) -> Iterator["AllHits"]:

@@ -91,8 +91,9 @@ def _add_render(subparsers: "argparse._SubParsersAction[_Parser]") -> None:
 def _add_trace(subparsers: "argparse._SubParsersAction[_Parser]") -> None:
     parser = subparsers.add_parser(
         "trace",
-        help="closest hits of rays from a file",
-        description="Find the closest hit of each ray; write arrays t, prim and uv.",
+        help="closest hits of rays from a file, or all",
+        description="Find the closest hit of each ray; write arrays t, prim and uv. With --all, find every "
+        "hit: those of ray i are rows offsets[i] to offsets[i+1], by ascending t.",
         formatter_class=argparse.ArgumentDefaultsHelpFormatter,
     )
     parser.add_argument("mesh", metavar="MESH", help="mesh file")
@@ -103,6 +104,7 @@ def _add_trace(subparsers: "argparse._SubParsersAction[_Parser]") -> None:
         "or .npz of origins, directions and maybe tmin, tmax",
     )
     parser.add_argument("-o", "--output", required=True, metavar="NPZ", help="hits to write")
+    parser.add_argument("--all", action="store_true", help="every hit of each ray; writes offsets, too")
     _add_scene_options(parser)
     parser.set_defaults(run=commands.trace_rays)
 

@@ -8,10 +8,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from wive.all_hits import AllHits
 from wive.arguments import rays as checked_rays
 from wive.backend import Backend, backends
 from wive.camera import Camera
 from wive.files import atomic_write, check_output
+from wive.hits import Hits
 from wive.meshfile import load_mesh
 from wive.npzfile import check_input, read_npy_or_npz
 from wive.progress import progress_bar
@@ -38,32 +40,38 @@ def render_picture(options: Namespace) -> None:
 
 
 def trace_rays(options: Namespace) -> None:
-    """`wive trace`: closest hits of a file of rays into an npz file."""
+    """`wive trace`: closest hits, or all, of a file of rays into an npz file."""
     output = check_output(options.output, ".npz")
     check_input(options.rays)
     scene = _scene(options, *load_mesh(options.mesh))
     origins, directions, tmin, tmax = _read_rays(options.rays)
     count = len(origins)
-    t = np.empty(count, np.float32)
-    prim = np.empty(count, np.int32)
-    uv = np.empty((count, 2), np.float32)
+    query = scene.intersect_all if options.all else scene.intersect
+    found: list[Hits | AllHits] = []
     begin = time.perf_counter()
     with progress_bar(count, "ray", "tracing") as advance:
-        for first in range(0, count, BATCH_RAYS):
+        for first in range(0, max(count, 1), BATCH_RAYS):
             batch = slice(first, first + BATCH_RAYS)
-            hits = scene.intersect(
+            hits = query(
                 origins[batch],
                 directions[batch],
                 tmin[batch] if len(tmin) == count else tmin[0],
                 tmax[batch] if len(tmax) == count else tmax[0],
                 threads=options.threads,
             )
-            t[batch], prim[batch], uv[batch] = hits.t, hits.prim, hits.uv
+            found.append(hits)
             advance(len(hits))
     seconds = time.perf_counter() - begin
+    arrays: dict[str, Any] = {
+        name: np.concatenate([getattr(hits, name) for hits in found]) for name in ("t", "prim", "uv")
+    }
+    if options.all:
+        counts = [np.diff(hits.offsets) for hits in found if isinstance(hits, AllHits)]
+        arrays["offsets"] = np.concatenate([[0], np.cumsum(np.concatenate(counts))])
     with atomic_write(output) as file:
-        np.savez(file, t=t, prim=prim, uv=uv)
-    print(f"{output}: {_rate(count, seconds)}, {np.count_nonzero(prim >= 0):,} hits, {_tracer(scene)}")
+        np.savez(file, **arrays)
+    number = np.count_nonzero(arrays["prim"] >= 0)
+    print(f"{output}: {_rate(count, seconds)}, {number:,} hits, {_tracer(scene)}")
 
 
 def describe_mesh(options: Namespace) -> None:

@@ -75,7 +75,7 @@ class CrossingQueries:
         count and to fill, and waits for the device in between: CUDA graphs can't capture this query.
 
         Raises ValueError or TypeError, in one line naming the argument, and MemoryError where the hits don't
-        fit into memory.
+        fit into memory (on a Warp device that is full, RuntimeError).
         """
         rays = check_rays(origins, directions, tmin, tmax, self._backend, self._device)
         chosen = arguments.lanes(lanes, self._warp is not None)
