@@ -92,9 +92,7 @@ def truth(
         distance, face = min(hits)
         t[ray], prim[ray] = nearest_float(distance), face
         for k in range(2):
-            uv[ray, k] = nearest_float(
-                Fraction(met.weights[ray, face, k + 1], met.determinant[ray, face])
-            )
+            uv[ray, k] = nearest_float(Fraction(met.weights[ray, face, k + 1], met.determinant[ray, face]))
     return Truth(t, prim, uv, prim >= 0)
 
 

@@ -75,9 +75,7 @@ def test_rays_in_the_planes_of_faces_keep_parity(backend: str) -> None:
     counts = scene.count(origins, directions)
     assert set(np.unique(counts)) == {0, 2}
     some = np.random.default_rng(4).permutation(len(origins))[:150]
-    np.testing.assert_array_equal(
-        counts[some], crossings(vertices, faces, origins[some], directions[some])
-    )
+    np.testing.assert_array_equal(counts[some], crossings(vertices, faces, origins[some], directions[some]))
 
 
 @pytest.mark.parametrize("place", [(0, 0, 0), (148376, 1234, -223423)])

@@ -135,7 +135,9 @@ def exact_triangles(lanes: SimpleNamespace, kept: int) -> SimpleNamespace:
 
     @without_gradient
     @wp.func
-    def take_closest(best: ExactBest, units: wp.uint64, at: int, stack: stack_argument, hit: wp.vec4, prim: int):
+    def take_closest(
+        best: ExactBest, units: wp.uint64, at: int, stack: stack_argument, hit: wp.vec4, prim: int
+    ):
         """The nearest hit; of hits at the same t, the lowest prim."""
         nearer = best.prim == wp.static(NO_PRIM) or hit[0] < best.given_t
         if not nearer and hit[0] == best.given_t:
@@ -159,7 +161,9 @@ def exact_triangles(lanes: SimpleNamespace, kept: int) -> SimpleNamespace:
         while rivals != wp.uint32(0):
             i = lowest_lane(rivals)
             rivals = rivals & (rivals - wp.uint32(1))
-            t = wp.cast(or_reduce(wp.where(lane == i, wp.cast(best.given_t, wp.uint32), wp.uint32(0))), wp.float32)
+            t = wp.cast(
+                or_reduce(wp.where(lane == i, wp.cast(best.given_t, wp.uint32), wp.uint32(0))), wp.float32
+            )
             at = int(or_reduce(wp.where(lane == i, wp.uint32(best.at), wp.uint32(0))))
             prim = int(or_reduce(wp.where(lane == i, wp.uint32(best.prim), wp.uint32(0))))
             if lane != i and best.prim != wp.static(NO_PRIM):
