@@ -1,4 +1,4 @@
-"""Meshes and rays at which rounding goes wrong: few-bit numbers, slivers, coincident faces, extreme exponents."""
+"""Meshes and rays at which rounding goes wrong: few bits, slivers, coincident faces, extreme exponents."""
 
 import functools
 from typing import NamedTuple
@@ -83,7 +83,7 @@ def thin_walls() -> HardSet:
     """Walls 1e-5 to 2e-7 apart, the far ones with the lower numbers, crossing each other here and there."""
     random = np.random.default_rng(25)
     square = np.array([[-1, -1, 1], [1, -1, 1], [0, 1, 1]])
-    walls = [square + [0, 0, gap] for gap in (1e-5, 1e-6, 3e-7, 2e-7, 0)]
+    walls = [square + np.array([0, 0, gap]) for gap in (1e-5, 1e-6, 3e-7, 2e-7, 0)]
     walls += [
         square + np.append(np.zeros((3, 2)), 1e-7 * random.standard_normal((3, 1)), axis=1) for _ in range(8)
     ]

@@ -99,7 +99,7 @@ def truth(
 def crossings(
     vertices: np.ndarray, faces: np.ndarray, origins: np.ndarray, directions: np.ndarray
 ) -> np.ndarray:
-    """(n,) how many triangles each ray from t = 0 on passes, of numbers of few bits, by moving the origins."""
+    """(n,) how many triangles each ray from t = 0 on passes, by moving the origins."""
     met = meetings(vertices, faces, origins, directions)
     passed = meetings(vertices, faces, origins, directions, moved=True).inside
     ahead = met.height * np.where(met.determinant < 0, -1, 1) >= 0

@@ -143,7 +143,7 @@ def test_the_filters_error_bound_holds_and_is_not_idle() -> None:
 
 
 def share_of_bound_used(name: str) -> float:
-    """The largest error over its bound of the weights, computed as cpu/triangle_exact.h does, against integers.
+    """The largest error over its bound of the weights, computed as in cpu/triangle_exact.h, against integers.
 
     The bound is the one derived in docs/accuracy.md.
     """
@@ -174,7 +174,7 @@ def share_of_bound_used(name: str) -> float:
     for k in range(3):
         i, j = (k + 1) % 3, (k + 2) % 3
         weight = x[i] * y[j] - y[i] * x[j]
-        # weight and bound times the direction's longest component, as integers times 2^(direction's unit - shift)
+        # All times the direction's longest component, in units of 2^(direction's unit - shift).
         for ray, face in np.ndindex(weight.shape):
             along_axis = int(forward[ray])
             exact = int(met.weights[ray, face, k]) << (scale - unit_of(rays.directions) + shift)

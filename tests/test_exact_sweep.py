@@ -12,7 +12,7 @@ REACH = 64  # of coordinates and directions: every product below fits into 64 bi
 
 
 def thin_integers(random: np.random.Generator, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Triangles of integer corners, one of which is the integer point nearest to a point of the opposite side."""
+    """Triangles of integer corners, one the integer point nearest to a point of the opposite side."""
     a, b = random.integers(-REACH, REACH + 1, (2, count, 3))
     c = np.rint(a + random.random((count, 1)) * (b - a)).astype(np.int64)
     return np.stack([a, b, c], axis=1).reshape(-1, 3).astype(np.float32), separate(count)

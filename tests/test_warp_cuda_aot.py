@@ -54,7 +54,7 @@ STACK_BYTES = {
     "count": STACK * 4 + 48,
     "all": STACK * 4 + 48,
 }
-EXACT_STACK_BYTES = 9 * 1024  # the integers of the rare cases, the closest hit's twice: it compares two triangles
+EXACT_STACK_BYTES = 9 * 1024  # the integers of the rare cases: two triangles' where hits are compared
 
 
 @dataclass(frozen=True)

@@ -3,6 +3,9 @@
 The text of the integers is compiled into `wive._cpu`, which gives it to both sides, so there is one of it.
 """
 
+# mypy: ignore-errors
+# Warp compiles these functions: to mypy they are no Python.
+
 import warp as wp
 
 from wive import _cpu
@@ -74,9 +77,11 @@ _SOLVE = (
     bool doubt = filter.low <= filter.error && -filter.error <= filter.high;
     const double share = 1.0 / (filter.weight[0] + filter.weight[1] + filter.weight[2]);
     const double weight_error = 6.0 * filter.error * (share < 0.0 ? -share : share);
-    const double depth =
-        (filter.weight[0] * filter.z[0] + filter.weight[1] * filter.z[1] + filter.weight[2] * filter.z[2]) * share;
-    const double depth_error = weight_error * (filter.depth_far - filter.depth_near) + 12.0 * e * filter.along;
+    double depth = 0.0;
+    for (int k = 0; k < 3; ++k) depth += filter.weight[k] * filter.z[k];
+    depth *= share;
+    const double extent = filter.depth_far - filter.depth_near;
+    const double depth_error = weight_error * extent + 12.0 * e * filter.along;
     const double values[3] = {depth * inverse, filter.weight[1] * share, filter.weight[2] * share};
     const double errors[3] = {depth_error * (inverse < 0.0 ? -inverse : inverse), weight_error, weight_error};
     wp::vec_t<4, float> hit;
@@ -100,7 +105,8 @@ _SOLVE = (
 """
 )
 
-# Rounding keeps order, so only where t rounds to a limit can it have crossed it. t is finite, limits need not be.
+# Rounding keeps order, so only where t rounds to a limit can it have crossed it. t is finite, limits need
+# not be.
 _WITHIN = (
     """
     if (t < tmin || t > tmax) return false;

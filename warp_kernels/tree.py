@@ -38,7 +38,7 @@ class CorruptTreeError(RuntimeError):
 class Tree:
     """A tree on a Warp device, made by `upload`.
 
-    `handle` is what kernels take: a `Bvh`, a `FastBvh` or an `ExactBvh`, by accuracy. `stack` is the number of
+    `handle` is what kernels take, by accuracy a `Bvh`, `FastBvh` or `ExactBvh`. `stack` is the number of
     stack entries its kernels are compiled for. `memory` counts bytes on the device.
     """
 

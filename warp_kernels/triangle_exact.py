@@ -1,4 +1,4 @@
-"""Exact hits on a block's triangles, as cpu/triangle_exact.h: a filter in double, integers where it doubts."""
+"""Exact hits on a block's triangles, as cpu/triangle_exact.h: a filter in double, then integers."""
 
 from types import SimpleNamespace
 

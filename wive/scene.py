@@ -49,8 +49,8 @@ class Scene(CrossingQueries):
             backend: "auto" (the fastest CPU backend this machine has) or a name in `wive.backends()`.
             device: where backend "warp" traces, by Warp's names: "cpu", "cuda:0", ...; None is the first CUDA
                 device, else "cpu". A device alone implies backend "warp"; CPU backends take none.
-            accuracy: "watertight" (rays never slip between triangles that share an edge or vertex), "fast", or
-                "exact" (hits, their order, t and uv are those of exact arithmetic, rounded once).
+            accuracy: "watertight" (rays never slip between triangles that share an edge or vertex), "fast",
+                or "exact" (hits, their order, t and uv are those of exact arithmetic, rounded once).
             nodes: "float32".
 
         C-contiguous float32 vertices and int32 faces are kept, not copied: don't change them afterwards.
