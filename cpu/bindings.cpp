@@ -12,6 +12,7 @@
 
 #include "builder.h"
 #include "dispatch.h"
+#include "exact_source.h"
 #include "gather.h"
 #include "parallel.h"
 #include "render.h"
@@ -259,6 +260,7 @@ PYBIND11_MODULE(_cpu, m, py::mod_gil_not_used()) {
     using namespace wive;
     m.doc() = "The compiled core of wive.";
     m.attr("compiler") = compiler_name;
+    m.attr("exact_source") = exact_source;
     m.def("kernels", [] {
         py::dict names;
         for (const auto& [name, reason] : list_kernels()) names[py::str(name)] = reason;
