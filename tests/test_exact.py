@@ -4,6 +4,7 @@ The oracle (oracle.py) is brute force in integers and fractions.
 """
 
 import functools
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -60,6 +61,30 @@ def test_hits_are_those_of_exact_arithmetic(backend: str, name: str) -> None:
 @pytest.mark.parametrize("name", ["small integers", "sphere far away", "mixed exponents"])
 def test_other_forms_of_the_kernels_are_as_exact(kernel: str, name: str) -> None:
     assert len(wrong_rays(answers(kernel, hard_set(name), ZERO, INFINITE), truth_of(name))) == 0
+
+
+@pytest.mark.parametrize("kernel", [name for name in CPU_KERNELS if "." not in name])
+@pytest.mark.parametrize("name", SETS)
+def test_compressed_trees_are_as_exact(kernel: str, name: str) -> None:
+    rays, right = hard_set(name), truth_of(name)
+    bvh = _cpu.Bvh(rays.vertices, rays.faces, "exact", nodes="compressed")
+    t, prim, uv, _ = bvh.intersect(kernel, rays.origins, rays.directions, ZERO, INFINITE)
+    occluded, _ = bvh.occluded(kernel, rays.origins, rays.directions, ZERO, INFINITE)
+    assert len(wrong_rays(Truth(t, prim, uv, occluded), right)) == 0
+
+
+@pytest.mark.timeout(120)
+@pytest.mark.parametrize("lanes", [8, 1])
+@pytest.mark.parametrize("name", SETS)
+def test_compressed_trees_are_as_exact_on_warp(device: str, name: str, lanes: Literal[1, 8]) -> None:
+    some = slice(None, None, 6 if lanes == 1 else 1)  # fibers are slow
+    rays, right = hard_set(name), truth_of(name)
+    scene = wive.Scene(rays.vertices, rays.faces, device=device, accuracy="exact", nodes="compressed")
+    arguments = rays.origins[some], rays.directions[some]
+    hits = scene.intersect(*arguments, lanes=lanes)
+    found = Truth(hits.t, hits.prim, hits.uv, scene.occluded(*arguments, lanes=lanes))
+    right = Truth(right.t[some], right.prim[some], right.uv[some], right.occluded[some])
+    assert len(wrong_rays(found, right)) == 0
 
 
 @pytest.mark.timeout(120)

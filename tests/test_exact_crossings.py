@@ -4,6 +4,7 @@ The oracle moves the rays by an amount too small to matter otherwise, in integer
 """
 
 import functools
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -55,12 +56,14 @@ def voxel_case(seed: int) -> tuple[HardSet, np.ndarray, np.ndarray]:
     return rays, crossings(*rays), inside
 
 
+@pytest.mark.parametrize("nodes", ["float32", "compressed"])
 @pytest.mark.parametrize("seed", [1, 2])
-def test_parity_tells_inside_from_outside(backend: str, seed: int) -> None:
+def test_parity_tells_inside_from_outside(
+    backend: str, seed: int, nodes: Literal["float32", "compressed"]
+) -> None:
     rays, right, inside = voxel_case(seed)
-    counts = wive.Scene(rays.vertices, rays.faces, backend=backend, accuracy="exact").count(
-        rays.origins, rays.directions
-    )
+    scene = wive.Scene(rays.vertices, rays.faces, backend=backend, accuracy="exact", nodes=nodes)
+    counts = scene.count(rays.origins, rays.directions)
     np.testing.assert_array_equal(counts % 2 == 1, inside)
     np.testing.assert_array_equal(counts, right)
 
