@@ -4,6 +4,7 @@
 
 #include "bindings.h"
 #include "dispatch.h"
+#include "exact_source.h"
 #include "parallel.h"
 #include "render.h"
 
@@ -120,6 +121,7 @@ PYBIND11_MODULE(_cpu, m, pybind11::mod_gil_not_used()) {
     using namespace wive;
     m.doc() = "The compiled core of wive.";
     m.attr("compiler") = compiler_name;
+    m.attr("exact_source") = exact_source;
     m.def("kernels", [] {
         py::dict names;
         for (const auto& [name, reason] : list_kernels()) names[py::str(name)] = reason;

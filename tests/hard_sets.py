@@ -1,4 +1,4 @@
-"""Meshes and rays at which rounding goes wrong: few-bit numbers, slivers, coincident faces, extreme exponents."""
+"""Meshes and rays at which rounding goes wrong: few bits, slivers, coincident faces, extreme exponents."""
 
 import functools
 from typing import NamedTuple
@@ -83,9 +83,13 @@ def thin_walls() -> HardSet:
     """Walls 1e-5 to 2e-7 apart, the far ones with the lower numbers, crossing each other here and there."""
     random = np.random.default_rng(25)
     square = np.array([[-1, -1, 1], [1, -1, 1], [0, 1, 1]])
-    walls = [square + [0, 0, gap] for gap in (1e-5, 1e-6, 3e-7, 2e-7, 0)]
-    walls += [square + np.append(np.zeros((3, 2)), 1e-7 * random.standard_normal((3, 1)), axis=1) for _ in range(8)]
-    directions = np.append(random.uniform(-0.9, 0.9, (1500, 2)), np.ones((1500, 1)), axis=1).astype(np.float32)
+    walls = [square + np.array([0, 0, gap]) for gap in (1e-5, 1e-6, 3e-7, 2e-7, 0)]
+    walls += [
+        square + np.append(np.zeros((3, 2)), 1e-7 * random.standard_normal((3, 1)), axis=1) for _ in range(8)
+    ]
+    directions = np.append(random.uniform(-0.9, 0.9, (1500, 2)), np.ones((1500, 1)), axis=1).astype(
+        np.float32
+    )
     origins = np.zeros_like(directions)
     return HardSet(np.concatenate(walls).astype(np.float32), separate(len(walls)), origins, directions)
 
@@ -113,7 +117,9 @@ def far_origins() -> HardSet:
     rays = aimed(vertices, faces, 29, 900, 1.0)
     origins = (rays.origins * 10 ** random.uniform(0, 7, (900, 1))).astype(np.float32)
     targets = (rays.directions.astype(np.float64) + rays.origins).astype(np.float32)
-    return rays._replace(origins=origins, directions=(targets.astype(np.float64) - origins).astype(np.float32))
+    return rays._replace(
+        origins=origins, directions=(targets.astype(np.float64) - origins).astype(np.float32)
+    )
 
 
 def scaled_soup(scale: float, length: float) -> HardSet:

@@ -92,16 +92,14 @@ def truth(
         distance, face = min(hits)
         t[ray], prim[ray] = nearest_float(distance), face
         for k in range(2):
-            uv[ray, k] = nearest_float(
-                Fraction(met.weights[ray, face, k + 1], met.determinant[ray, face])
-            )
+            uv[ray, k] = nearest_float(Fraction(met.weights[ray, face, k + 1], met.determinant[ray, face]))
     return Truth(t, prim, uv, prim >= 0)
 
 
 def crossings(
     vertices: np.ndarray, faces: np.ndarray, origins: np.ndarray, directions: np.ndarray
 ) -> np.ndarray:
-    """(n,) how many triangles each ray from t = 0 on passes, of numbers of few bits, by moving the origins."""
+    """(n,) how many triangles each ray from t = 0 on passes, by moving the origins."""
     met = meetings(vertices, faces, origins, directions)
     passed = meetings(vertices, faces, origins, directions, moved=True).inside
     ahead = met.height * np.where(met.determinant < 0, -1, 1) >= 0

@@ -12,7 +12,7 @@ import wive
 
 pytestmark = pytest.mark.timeout(120)
 
-ACCURACIES = ("fast", "watertight")
+ACCURACIES = ("fast", "watertight", "exact")
 ARRAYS = ("offsets", "t", "prim", "uv")
 
 

@@ -119,9 +119,9 @@ def test_a_vertex_that_is_no_place_is_named_by_its_index(value, dtype):
             "backend must be one of auto, avx512, avx2, scalar, warp in this version of wive, got 3",
         ),
         (
-            {"accuracy": "exact"},
+            {"accuracy": "precise"},
             ValueError,
-            "accuracy must be one of fast, watertight in this version of wive, got 'exact'",
+            "accuracy must be one of fast, watertight, exact in this version of wive, got 'precise'",
         ),
         (
             {"nodes": "small"},

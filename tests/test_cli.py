@@ -154,8 +154,8 @@ def test_backends_lists_each_with_its_reason(capsys):
             "leave one of them out",
         ),
         (
-            ("info", "{ball}", "--accuracy", "exact"),
-            "accuracy must be one of fast, watertight in this version of wive, got 'exact'",
+            ("info", "{ball}", "--accuracy", "precise"),
+            "accuracy must be one of fast, watertight, exact in this version of wive, got 'precise'",
         ),
         (("trace", "{ball}", "{tmp}/no.npy", "-o", "{tmp}/hits.npz"), "{tmp}/no.npy: no such file"),
         (

@@ -27,7 +27,7 @@ from wive import _cpu
 
 Mesh = tuple[np.ndarray, np.ndarray]
 
-ACCURACIES = ("fast", "watertight")
+ACCURACIES = ("fast", "watertight", "exact")
 FORMS = ("float32", "compressed")
 CPU_BACKENDS = [name for name in wive.backend.CPU_BACKENDS if wive.backends()[name].usable]
 ZERO, INFINITE = np.zeros(1, np.float32), np.full(1, np.inf, np.float32)
@@ -99,7 +99,8 @@ def seen_edge_on(mesh: Mesh, bvhs: list[_cpu.Bvh], kernel: str, rays: Mesh) -> n
 @pytest.mark.parametrize("accuracy", ACCURACIES)
 def test_hits_on_hard_meshes_are_those_of_float32_nodes(mesh: Mesh, accuracy: str, kernel: str) -> None:
     bvhs = both(mesh, accuracy)
-    rays = rays_at(mesh, 3000, 1)
+    # Where hits coincide, exact trees compare them all in integers: that takes long.
+    rays = rays_at(mesh, 300 if accuracy == "exact" else 3000, 1)
     asked = ~seen_edge_on(mesh, bvhs, kernel, rays) if accuracy == "fast" else None
     assert asked is None or asked.mean() > 0.5
     for in_flight in (1, 24):

@@ -4,6 +4,7 @@ The oracle (oracle.py) is brute force in integers and fractions.
 """
 
 import functools
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -25,13 +26,19 @@ def truth_of(name: str) -> Truth:
     return truth(*hard_set(name), ZERO, INFINITE)
 
 
-def answers(backend: str, rays: HardSet, tmin: np.ndarray, tmax: np.ndarray, accuracy: str = "exact") -> Truth:
+def answers(
+    backend: str, rays: HardSet, tmin: np.ndarray, tmax: np.ndarray, accuracy: str = "exact"
+) -> Truth:
     if "." in backend:  # a form of a CPU kernel that has no name as a backend
         bvh = _cpu.Bvh(rays.vertices, rays.faces, accuracy)
         t, prim, uv, _ = bvh.intersect(backend, rays.origins, rays.directions, tmin, tmax)
         return Truth(t, prim, uv, bvh.occluded(backend, rays.origins, rays.directions, tmin, tmax)[0])
     scene = wive.Scene(rays.vertices, rays.faces, backend=backend, accuracy=accuracy)
-    arguments = rays.origins, rays.directions, *(limit[0] if len(limit) == 1 else limit for limit in (tmin, tmax))
+    arguments = (
+        rays.origins,
+        rays.directions,
+        *(limit[0] if len(limit) == 1 else limit for limit in (tmin, tmax)),
+    )
     hits = scene.intersect(*arguments)
     return Truth(hits.t, hits.prim, hits.uv, scene.occluded(*arguments))
 
@@ -54,6 +61,43 @@ def test_hits_are_those_of_exact_arithmetic(backend: str, name: str) -> None:
 @pytest.mark.parametrize("name", ["small integers", "sphere far away", "mixed exponents"])
 def test_other_forms_of_the_kernels_are_as_exact(kernel: str, name: str) -> None:
     assert len(wrong_rays(answers(kernel, hard_set(name), ZERO, INFINITE), truth_of(name))) == 0
+
+
+@pytest.mark.parametrize("kernel", [name for name in CPU_KERNELS if "." not in name])
+@pytest.mark.parametrize("name", SETS)
+def test_compressed_trees_are_as_exact(kernel: str, name: str) -> None:
+    rays, right = hard_set(name), truth_of(name)
+    bvh = _cpu.Bvh(rays.vertices, rays.faces, "exact", nodes="compressed")
+    t, prim, uv, _ = bvh.intersect(kernel, rays.origins, rays.directions, ZERO, INFINITE)
+    occluded, _ = bvh.occluded(kernel, rays.origins, rays.directions, ZERO, INFINITE)
+    assert len(wrong_rays(Truth(t, prim, uv, occluded), right)) == 0
+
+
+@pytest.mark.timeout(120)
+@pytest.mark.parametrize("lanes", [8, 1])
+@pytest.mark.parametrize("name", SETS)
+def test_compressed_trees_are_as_exact_on_warp(device: str, name: str, lanes: Literal[1, 8]) -> None:
+    some = slice(None, None, 6 if lanes == 1 else 1)  # fibers are slow
+    rays, right = hard_set(name), truth_of(name)
+    scene = wive.Scene(rays.vertices, rays.faces, device=device, accuracy="exact", nodes="compressed")
+    arguments = rays.origins[some], rays.directions[some]
+    hits = scene.intersect(*arguments, lanes=lanes)
+    found = Truth(hits.t, hits.prim, hits.uv, scene.occluded(*arguments, lanes=lanes))
+    right = Truth(right.t[some], right.prim[some], right.uv[some], right.occluded[some])
+    assert len(wrong_rays(found, right)) == 0
+
+
+@pytest.mark.timeout(120)
+@pytest.mark.parametrize("name", SETS)
+def test_eight_threads_a_ray_are_as_exact(device: str, name: str) -> None:
+    some = slice(None, None, 6)  # fibers are slow
+    rays, right = hard_set(name), truth_of(name)
+    scene = wive.Scene(rays.vertices, rays.faces, device=device, accuracy="exact")
+    arguments = rays.origins[some], rays.directions[some]
+    hits = scene.intersect(*arguments, lanes=1)
+    found = Truth(hits.t, hits.prim, hits.uv, scene.occluded(*arguments, lanes=1))
+    right = Truth(right.t[some], right.prim[some], right.uv[some], right.occluded[some])
+    assert len(wrong_rays(found, right)) == 0
 
 
 @pytest.mark.parametrize("accuracy", ["fast", "watertight"])
@@ -124,7 +168,7 @@ def test_the_filters_error_bound_holds_and_is_not_idle() -> None:
 
 
 def share_of_bound_used(name: str) -> float:
-    """The largest error over its bound of the weights, computed as cpu/triangle_exact.h does, against integers.
+    """The largest error over its bound of the weights, computed as in cpu/triangle_exact.h, against integers.
 
     The bound is the one derived in docs/accuracy.md.
     """
@@ -138,7 +182,10 @@ def share_of_bound_used(name: str) -> float:
     d = take(d, order)
     slopes = d[:, :2] * (1 / d[:, 2:])
     slopes[np.abs(slopes) < 2.0**-100] = 0
-    p = [take(corner[None] - o, order[:, None]) for corner in rays.vertices[rays.faces].astype(np.float64).swapaxes(0, 1)]
+    p = [
+        take(corner[None] - o, order[:, None])
+        for corner in rays.vertices[rays.faces].astype(np.float64).swapaxes(0, 1)
+    ]
     x = [q[..., 0] - slopes[:, None, 0] * q[..., 2] for q in p]
     y = [q[..., 1] - slopes[:, None, 1] * q[..., 2] for q in p]
     aside = np.max(np.abs(x + y), axis=0)
@@ -152,7 +199,7 @@ def share_of_bound_used(name: str) -> float:
     for k in range(3):
         i, j = (k + 1) % 3, (k + 2) % 3
         weight = x[i] * y[j] - y[i] * x[j]
-        # weight and bound times the direction's longest component, as integers times 2^(direction's unit - shift)
+        # All times the direction's longest component, in units of 2^(direction's unit - shift).
         for ray, face in np.ndindex(weight.shape):
             along_axis = int(forward[ray])
             exact = int(met.weights[ray, face, k]) << (scale - unit_of(rays.directions) + shift)

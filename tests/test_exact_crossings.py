@@ -4,6 +4,7 @@ The oracle moves the rays by an amount too small to matter otherwise, in integer
 """
 
 import functools
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -34,7 +35,7 @@ def voxels(seed: int, share: float = 0.4) -> tuple[np.ndarray, np.ndarray, np.nd
 
 
 def surface_rays(vertices: np.ndarray, seed: int, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Rays from places of quarter coordinates off the integer planes, along axes, diagonals and at vertices."""
+    """Rays from places of quarter coordinates off the integer planes, along axes and at vertices."""
     random = np.random.default_rng(seed)
     origins = random.integers(-1, SIDE + 1, (count, 3)) + 0.25 * random.integers(1, 4, (count, 3))
     aims = vertices[random.integers(len(vertices), size=count)] - origins
@@ -55,18 +56,20 @@ def voxel_case(seed: int) -> tuple[HardSet, np.ndarray, np.ndarray]:
     return rays, crossings(*rays), inside
 
 
+@pytest.mark.parametrize("nodes", ["float32", "compressed"])
 @pytest.mark.parametrize("seed", [1, 2])
-def test_parity_tells_inside_from_outside(backend: str, seed: int) -> None:
+def test_parity_tells_inside_from_outside(
+    backend: str, seed: int, nodes: Literal["float32", "compressed"]
+) -> None:
     rays, right, inside = voxel_case(seed)
-    counts = wive.Scene(rays.vertices, rays.faces, backend=backend, accuracy="exact").count(
-        rays.origins, rays.directions
-    )
+    scene = wive.Scene(rays.vertices, rays.faces, backend=backend, accuracy="exact", nodes=nodes)
+    counts = scene.count(rays.origins, rays.directions)
     np.testing.assert_array_equal(counts % 2 == 1, inside)
     np.testing.assert_array_equal(counts, right)
 
 
 def test_rays_in_the_planes_of_faces_keep_parity(backend: str) -> None:
-    """From outside, along grid lines, edges and face diagonals of a box: in planes of its sides or beside them."""
+    """From outside, along grid lines, edges and face diagonals of a box."""
     vertices, faces = grid(3)
     places = np.stack(np.meshgrid(*[np.arange(0, 3.5, 0.5)] * 3), axis=-1).reshape(-1, 3)
     directions = np.repeat(DIRECTIONS[np.abs(DIRECTIONS).max(axis=1) > 0], len(places), axis=0)
@@ -75,9 +78,7 @@ def test_rays_in_the_planes_of_faces_keep_parity(backend: str) -> None:
     counts = scene.count(origins, directions)
     assert set(np.unique(counts)) == {0, 2}
     some = np.random.default_rng(4).permutation(len(origins))[:150]
-    np.testing.assert_array_equal(
-        counts[some], crossings(vertices, faces, origins[some], directions[some])
-    )
+    np.testing.assert_array_equal(counts[some], crossings(vertices, faces, origins[some], directions[some]))
 
 
 @pytest.mark.parametrize("place", [(0, 0, 0), (148376, 1234, -223423)])
@@ -116,7 +117,7 @@ def test_all_hits_are_the_crossings_with_exact_numbers(backend: str) -> None:
 
 
 def test_all_hits_of_rounded_numbers_are_the_crossings(backend: str) -> None:
-    """Numbers of full width: each hit of `intersect_all` is one of the closed triangles', and rightly rounded."""
+    """Numbers of full width: each hit is one of the closed triangles', and rightly rounded."""
     rays = hard_set("thin walls")
     rays = rays._replace(origins=rays.origins[:200], directions=rays.directions[:200])
     scene = wive.Scene(rays.vertices, rays.faces, backend=backend, accuracy="exact")

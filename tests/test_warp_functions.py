@@ -66,8 +66,32 @@ def count_fast(
     counts[i] = warp_kernels.count_hits(bvh, origins[i], directions[i], 0.25, 1.5)
 
 
-COUNTERS = {"watertight": count_watertight, "fast": count_fast}
-KERNELS = {"watertight": trace_watertight, "fast": trace_fast}
+@wp.kernel
+def trace_exact(
+    bvh: warp_kernels.ExactBvh,
+    origins: wp.array(dtype=wp.vec3),
+    directions: wp.array(dtype=wp.vec3),
+    hits: wp.array(dtype=warp_kernels.Hit),
+    occluded: wp.array(dtype=wp.bool),
+):
+    i = wp.tid()
+    hits[i] = warp_kernels.closest_hit(bvh, origins[i], directions[i], 0.0, wp.inf)
+    occluded[i] = warp_kernels.any_hit(bvh, origins[i], directions[i], 0.0, wp.inf)
+
+
+@wp.kernel
+def count_exact(
+    bvh: warp_kernels.ExactBvh,
+    origins: wp.array(dtype=wp.vec3),
+    directions: wp.array(dtype=wp.vec3),
+    counts: wp.array(dtype=wp.int32),
+):
+    i = wp.tid()
+    counts[i] = warp_kernels.count_hits(bvh, origins[i], directions[i], 0.25, 1.5)
+
+
+COUNTERS = {"watertight": count_watertight, "fast": count_fast, "exact": count_exact}
+KERNELS = {"watertight": trace_watertight, "fast": trace_fast, "exact": trace_exact}
 
 
 def trace(kernel: wp.Kernel, tree: warp_kernels.Tree, rays: tuple[np.ndarray, np.ndarray]) -> Answers:
@@ -108,12 +132,13 @@ def test_hits_counted_in_a_users_kernel_are_those_of_the_core(accuracy: str) -> 
     np.testing.assert_array_equal(counts.numpy(), expected)
 
 
-def test_handle_of_the_wrong_accuracy_is_an_error_and_misses() -> None:
-    tree = warp_kernels.upload(_cpu.Bvh(*soup(100, 1), "fast"), "cpu")
+@pytest.mark.parametrize("other", ["fast", "exact"])
+def test_handle_of_the_wrong_accuracy_is_an_error_and_misses(other: str) -> None:
+    tree = warp_kernels.upload(_cpu.Bvh(*soup(100, 1), other), "cpu")
     found = trace(trace_watertight, tree, random_rays(50, 2))
     assert (found.prim == -1).all() and not found.occluded.any()
     with pytest.raises(
-        warp_kernels.CorruptTreeError, match="fast tree's handle was given to a kernel that takes Bvh"
+        warp_kernels.CorruptTreeError, match="given to a kernel that takes that of another accuracy"
     ):
         warp_kernels.check(tree)
 

@@ -16,7 +16,7 @@ pytestmark = pytest.mark.timeout(120)
 
 HITS = ("t", "prim", "uv", "occluded", "counts", "offsets", "all_t", "all_prim", "all_uv")
 CPU_KERNELS = [name for name, reason in _cpu.kernels().items() if not reason and "." not in name]
-ACCURACIES = ("fast", "watertight")
+ACCURACIES = ("fast", "watertight", "exact")
 FORMS = ("float32", "compressed")
 Mesh = tuple[np.ndarray, np.ndarray]
 

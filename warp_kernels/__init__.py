@@ -10,7 +10,7 @@ Launches over batches of rays (what `wive.Scene` uses):
     check(tree)                                # waits; raises where a kernel met a corrupt tree
 
 Functions for users' own kernels take `tree.handle`, whose type says the accuracy: `Bvh` for watertight trees,
-`FastBvh` for fast ones.
+`FastBvh` for fast ones, `ExactBvh` for exact ones.
 
     @wp.kernel
     def shade(bvh: Bvh, origins: wp.array[wp.vec3], directions: wp.array[wp.vec3], depth: wp.array[float]):
@@ -23,7 +23,7 @@ Hits are those of the C++ backends, bit for bit: t is infinity, prim -1 and u, v
 
 from wive.warp_kernels.functions import any_hit, closest_hit, count_hits
 from wive.warp_kernels.gradients import SurfaceHit, differentiable_hit
-from wive.warp_kernels.handle import Bvh, FastBvh, Hit
+from wive.warp_kernels.handle import Bvh, ExactBvh, FastBvh, Hit
 from wive.warp_kernels.launch import launch_any, launch_closest
 from wive.warp_kernels.launch_all import MOST_HITS, launch_all, launch_count, scan_counts
 from wive.warp_kernels.tree import CorruptTreeError, Tree, check, upload
@@ -32,6 +32,7 @@ __all__ = [
     "MOST_HITS",
     "Bvh",
     "CorruptTreeError",
+    "ExactBvh",
     "FastBvh",
     "Hit",
     "SurfaceHit",

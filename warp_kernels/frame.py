@@ -28,6 +28,9 @@ class RayFrame:
     scale: wp.float32  # t of the caller's ray = scale * t here
     octant: wp.int32  # bit a: negative on axis a, from the sign of the reciprocal
     longest_axis: wp.int32
+    given_direction: wp.vec3  # as the caller gave them: exact trees alone need these three
+    given_tmin: wp.float32
+    given_tmax: wp.float32
     valid: wp.bool  # false where the ray hits nothing by rule
 
 
@@ -70,6 +73,9 @@ def load_frame(
     ray.tmax = tmax * unscale
 
     ray.origin = origin
+    ray.given_direction = direction
+    ray.given_tmin = tmin
+    ray.given_tmax = tmax
     ray.direction = direction * ray.scale
     relative = origin - center
     reach = float(0.0)  # noqa: UP018

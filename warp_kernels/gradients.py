@@ -6,7 +6,7 @@
 import warp as wp
 
 from wive.warp_kernels.functions import closest_hit
-from wive.warp_kernels.handle import Bvh, FastBvh
+from wive.warp_kernels.handle import Bvh, ExactBvh, FastBvh
 
 
 @wp.struct
@@ -61,7 +61,8 @@ def differentiable_hit(
     `vertices` and `faces` are the mesh that the tree was built over. The traversal finds the triangle and has
     no gradient; t and the point are then taken from the triangle in float, so t may differ from
     `closest_hit`'s in its last digits. Gradients are those of the triangle that is hit: they don't see a ray
-    slip off an edge. It takes the handle of a watertight tree (`Bvh`) or of a fast one (`FastBvh`).
+    slip off an edge. It takes the handle of a watertight tree (`Bvh`), a fast one (`FastBvh`)
+    or an exact one (`ExactBvh`).
     """
     hit = closest_hit(bvh, origin, direction, tmin, tmax)
     return on_surface(hit.prim, vertices, faces, origin, direction)
@@ -70,6 +71,20 @@ def differentiable_hit(
 @wp.func
 def differentiable_hit(  # noqa: D103, F811
     bvh: FastBvh,
+    vertices: wp.array(dtype=wp.vec3),
+    faces: wp.array(dtype=wp.vec3i),
+    origin: wp.vec3,
+    direction: wp.vec3,
+    tmin: float,
+    tmax: float,
+) -> SurfaceHit:
+    hit = closest_hit(bvh, origin, direction, tmin, tmax)
+    return on_surface(hit.prim, vertices, faces, origin, direction)
+
+
+@wp.func
+def differentiable_hit(  # noqa: D103, F811
+    bvh: ExactBvh,
     vertices: wp.array(dtype=wp.vec3),
     faces: wp.array(dtype=wp.vec3i),
     origin: wp.vec3,

@@ -34,7 +34,7 @@ STACK_TOO_SMALL = 2
 WRONG_ACCURACY = 3
 COMPRESSED = 4
 
-ACCURACIES = ("fast", "watertight")
+ACCURACIES = ("fast", "watertight", "exact")
 
 
 @wp.struct
@@ -47,7 +47,7 @@ class Bvh:
     extent: wp.vec3
     step_limit: wp.int32  # no traversal of a sound tree takes more steps
     stack: wp.int32  # entries a traversal may need
-    watertight: wp.int32
+    accuracy: wp.int32  # its place in ACCURACIES: a handle of another type has another
     compressed: wp.int32
 
 
@@ -61,7 +61,21 @@ class FastBvh:
     extent: wp.vec3
     step_limit: wp.int32
     stack: wp.int32
-    watertight: wp.int32
+    accuracy: wp.int32
+    compressed: wp.int32
+
+
+@wp.struct
+class ExactBvh:
+    """The same of a tree built with accuracy "exact"."""
+
+    units: wp.array(dtype=wp.float32)
+    error: wp.array(dtype=wp.int32)
+    center: wp.vec3
+    extent: wp.vec3
+    step_limit: wp.int32
+    stack: wp.int32
+    accuracy: wp.int32
     compressed: wp.int32
 
 
@@ -78,4 +92,4 @@ class Hit:
     prim: wp.int32
 
 
-HANDLES: dict[str, Any] = {"fast": FastBvh, "watertight": Bvh}
+HANDLES: dict[str, Any] = {"fast": FastBvh, "watertight": Bvh, "exact": ExactBvh}

@@ -11,7 +11,8 @@ import warp as wp
 from wive.warp_kernels.frame import load_frame
 from wive.warp_kernels.handle import ALL_BITS, HANDLES, NO_PRIM
 from wive.warp_kernels.lanes import reductions
-from wive.warp_kernels.traversal import Traversal, make_traversal
+from wive.warp_kernels.query_exact import distance_of
+from wive.warp_kernels.traversal import STATES, Traversal, make_traversal, query_of
 
 # Multiplications and additions stay apart: fused, the two triangles at an edge would not compute the same
 # numbers.
@@ -30,6 +31,7 @@ def closest_kernel(
 ) -> wp.Kernel:
     """The kernel behind `launch_closest`, of dimensions (n, 8 // length)."""
     traverse = make_traversal("closest", accuracy, length, stack, counters, nodes)
+    state_type = STATES[query_of("closest", accuracy).state]
     or_reduce, min_reduce = reductions(length)
     tree_type = HANDLES[accuracy]
 
@@ -49,7 +51,7 @@ def closest_kernel(
         ray = load_frame(
             tree.center, tree.extent, origins[i], directions[i], value_of(tmin, i), value_of(tmax, i)
         )
-        found = Traversal()
+        found = state_type()
         found.best.prim = wp.static(NO_PRIM)
         # One answer for the group, whose threads may see the flag change at different times.
         if ray.valid and or_reduce(wp.uint32(tree.error[0])) == wp.uint32(0):
@@ -65,7 +67,7 @@ def closest_kernel(
                 if uv:
                     uv[i] = wp.vec2(wp.nan, wp.nan)
         elif own == winner:
-            t[i] = found.best.t * ray.scale
+            t[i] = distance_of(found.best, ray.scale)
             prim[i] = found.best.prim
             if uv:
                 uv[i] = wp.vec2(found.best.u, found.best.v)

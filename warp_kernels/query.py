@@ -31,6 +31,12 @@ def begin_best(ray: RayFrame):
 
 
 @wp.func
+def distance_of(best: Best, scale: float):
+    """t in the caller's units."""
+    return best.t * scale
+
+
+@wp.func
 def offer_closest(best: Best, tmin: float, hit: wp.vec3, prim: int):
     """The nearest hit in [tmin, t]; of hits at the same t, the lowest prim, in whatever order they come."""
     t = hit[0]

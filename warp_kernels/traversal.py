@@ -12,7 +12,7 @@ from types import SimpleNamespace
 
 import warp as wp
 
-from wive.warp_kernels import triangle_fast, triangle_watertight
+from wive.warp_kernels import triangle_exact, triangle_fast, triangle_watertight
 from wive.warp_kernels.blocks import BLOCKS
 from wive.warp_kernels.frame import RayFrame, is_negative
 from wive.warp_kernels.handle import (
@@ -22,6 +22,7 @@ from wive.warp_kernels.handle import (
     CORRUPT,
     END_OF_STACK,
     HANDLES,
+    NO_PRIM,
     NODE_WIDTH,
     NODE_WORDS,
     SIGN_BIT,
@@ -31,11 +32,14 @@ from wive.warp_kernels.lanes import address_of, lanes_of, load_float, lowest_lan
 from wive.warp_kernels.nodes import NODES
 from wive.warp_kernels.query import QUERIES, Best
 from wive.warp_kernels.query_all import Crossings
+from wive.warp_kernels.query_exact import EXACT_QUERIES, ExactBest, ExactLeaf, ExactTraversal
 from wive.warp_kernels.slabs import make_visit
+from wive.warp_kernels.triangle_exact import make_exact_leaf_test
 
 TRIANGLES = {
     "fast": (triangle_fast.fast_triangles, triangle_fast.KEPT_WORDS),
     "watertight": (triangle_watertight.watertight_triangles, triangle_watertight.KEPT_WORDS),
+    "exact": (triangle_exact.exact_triangles, triangle_exact.KEPT_WORDS),
 }
 
 
@@ -84,7 +88,8 @@ def make_traversal(
     That many stack entries must do for the tree.
     """
     traverse_from = make_traversal_from(query, accuracy, length, entries, counters, nodes)
-    begin, tree_type, state_type = QUERIES[query].begin, HANDLES[accuracy], STATES[QUERIES[query].state]
+    asked = query_of(query, accuracy)
+    begin, tree_type, state_type = asked.begin, HANDLES[accuracy], STATES[asked.state]
 
     @without_gradient
     @wp.func
@@ -99,19 +104,25 @@ def make_traversal_from(
     query: str, accuracy: str, length: int, entries: int, counters: bool, nodes: str = "float32"
 ) -> wp.Function:
     """The same, beginning with what its last argument holds."""
-    asked = QUERIES[query]
+    asked = query_of(query, accuracy)
     in_order: bool = asked.in_order
     make_triangles, kept_words = TRIANGLES[accuracy]
     lanes = lanes_of(length, entries, in_order, kept_words)
     blocks_form = BLOCKS[nodes](lanes)
     triangles = make_triangles(lanes, blocks_form, entries * (2 if in_order else 1))
     visit = make_visit(lanes, NODES[nodes](lanes), entries, in_order)
-    test_leaf = make_leaf_test(asked, lanes, blocks_form, triangles)
+    if accuracy == "exact":
+        test_leaf = make_exact_leaf_test(asked, lanes, blocks_form, triangles, LEAVES[asked.state])
+    else:
+        test_leaf = make_leaf_test(asked, lanes, blocks_form, triangles)
     count_triangles = make_count(blocks_form)
     node_words: int = NODE_WORDS if nodes == "float32" else COMPRESSED_NODE_WORDS
     block_words: int = blocks_form.least_words
     tree_type, best_type, state_type = HANDLES[accuracy], asked.state, STATES[asked.state]
     one_is_enough: bool = asked.one_is_enough
+    # Where a ray's threads may hold hits whose t round to the same float, they settle which is the best.
+    settles: bool = asked.state is ExactBest and length == 1
+    settle = triangles.settle if settles else None
     done = asked.done
     prepare = triangles.prepare
     new_stack, sync = lanes.new_stack, lanes.sync
@@ -172,6 +183,10 @@ def make_traversal_from(
                     top -= 1
                     child = wp.cast(load_word(stack, top), wp.int32)
             sync()
+        if wp.static(settles):
+            state.best = settle(units, stack, lane, state.best)
+            own = wp.where(state.best.prim == wp.static(NO_PRIM), wp.inf, state.best.t)
+            state.tmax = unsortable(min_reduce(sortable(own)))
         return state
 
     return traverse_from
@@ -212,8 +227,13 @@ class CrossedLeaf:
 
 
 # What a traversal and a leaf's test return, by what the query keeps.
-STATES = {Best: Traversal, Crossings: Crossed}
-LEAVES = {Best: TestedLeaf, Crossings: CrossedLeaf}
+STATES = {Best: Traversal, Crossings: Crossed, ExactBest: ExactTraversal}
+LEAVES = {Best: TestedLeaf, Crossings: CrossedLeaf, ExactBest: ExactLeaf}
+
+
+def query_of(query: str, accuracy: str) -> SimpleNamespace:
+    """What is asked of a tree of that accuracy."""
+    return (EXACT_QUERIES if accuracy == "exact" else QUERIES)[query]
 
 
 def make_leaf_test(

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from wive import _cpu
 from wive.warp_kernels.handle import (
+    ACCURACIES,
     COMPRESSED,
     COMPRESSED_NODE_WORDS,
     CORRUPT,
@@ -29,7 +30,7 @@ STACK_SIZES = (32, 64, 96, 128, 256, 512)  # kernels are compiled for the least 
 _REASONS = {
     CORRUPT: "a traversal left the tree or did not end: the tree's memory was overwritten",
     STACK_TOO_SMALL: "the tree is too deep for closest_hit and any_hit; use launch_closest and launch_any",
-    WRONG_ACCURACY: "a fast tree's handle was given to a kernel that takes Bvh, or the other way round",
+    WRONG_ACCURACY: "the handle of a tree was given to a kernel that takes that of another accuracy",
     COMPRESSED: "closest_hit and any_hit take trees with nodes 'float32'; use launch_closest and launch_any",
 }
 
@@ -42,7 +43,7 @@ class CorruptTreeError(RuntimeError):
 class Tree:
     """A tree on a Warp device, made by `upload`.
 
-    `handle` is what kernels take: a `Bvh`, or a `FastBvh` where accuracy is "fast". `stack` is the number of
+    `handle` is what kernels take, by accuracy a `Bvh`, `FastBvh` or `ExactBvh`. `stack` is the number of
     stack entries its kernels are compiled for, `nodes` is "float32" or "compressed". `memory` counts bytes on
     the device.
     """
@@ -91,7 +92,7 @@ def upload(bvh: _cpu.Bvh, device: wp.DeviceLike = None) -> Tree:
     # In units, a node is larger than the least leaf, and none is met twice.
     handle.step_limit = len(bvh.units) // (LEAST_COMPRESSED_WORDS // 8 if compressed else 5) + 1
     handle.stack = needed
-    handle.watertight = int(bvh.accuracy == "watertight")
+    handle.accuracy = ACCURACIES.index(bvh.accuracy)
     handle.compressed = int(compressed)
     stack = next(size for size in STACK_SIZES if size >= needed)
     return Tree(

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 compiler: str  # the C++ compiler's name and version
+exact_source: str  # C++ text of the exact arithmetic, which the Warp kernels compile as well
 
 def kernels() -> dict[str, str]:
     """Every traversal kernel compiled in, best first, and why this machine can't run it ("" where it can).

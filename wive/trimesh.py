@@ -51,7 +51,7 @@ class RayMeshIntersector:
         *,
         backend: str = "auto",
         device: str | None = None,
-        accuracy: Literal["fast", "watertight"] = "watertight",
+        accuracy: Literal["fast", "watertight", "exact"] = "watertight",
         threads: int | None = None,
     ) -> None:
         """Take a mesh to trace.
