@@ -98,7 +98,7 @@ def _mesh_query_ray(vertices: Array, faces: NDArray[np.int32]) -> Contender:
             id(origins), [wp.array(rows, dtype=wp.vec3, device="cpu") for rows in (origins, directions)]
         )
         t, prim, uv = query.outputs(len(origins))
-        query.launch(*rays, t, prim, uv)
+        query.launch(rays[0], rays[1], t, prim, uv)
         return t.numpy(), prim.numpy()
 
     return Contender("mesh_query_ray", trace)

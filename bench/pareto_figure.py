@@ -30,7 +30,11 @@ def draw(means: Sequence[Row], rows: Sequence[Row]) -> Figure:
             if row["single"] is not None:
                 panel.scatter(row["single"], rate, facecolors="none", edgecolors=f"C{i}", zorder=3)
             panel.annotate(
-                row["contender"], (row["mrays"], rate), (5, 5), textcoords="offset points", fontsize=8
+                row["contender"],
+                (row["mrays"], rate),
+                (5, 5 + 9 * (i % 4)),
+                textcoords="offset points",
+                fontsize=8,
             )
         _rate_axis(panel, label)
         panel.set_xlabel("Mray/s on one core; hollow: one ray at a time")

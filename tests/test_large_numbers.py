@@ -1,4 +1,4 @@
-"""What the hard cases ask about, of millions of rays: --slow, about ten minutes on two cores."""
+"""What the hard cases ask about, of millions of rays: --slow, about a quarter of an hour on two cores."""
 
 from collections.abc import Iterator
 
