@@ -11,6 +11,7 @@ BENCHES = {
     "latency": "seconds of a call over batch sizes: every backend, wp.mesh_query_ray, embreex",
     "order": "steps per ray for five orders of visiting a node's children, and their speed",
     "paper": "the WiVe paper's tables: path tracing with its traversals and with Embree's",
+    "pareto": "speed against leaks, wrong triangles and the error of t, with Embree and Warp",
     "python": "what a Python user sees: embreex, trimesh, Warp and wive, NumPy in and out",
     "quality": 'what quality="high" saves in steps per ray and costs in build time',
 }

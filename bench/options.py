@@ -38,12 +38,18 @@ def in_flights(text: str) -> tuple[int, ...]:
 
 def scene_parser(name: str, description: str | None) -> argparse.ArgumentParser:
     """A parser with what every bench over scenes takes."""
-    summary = (description or "").split("\n")[0]
-    parser = argparse.ArgumentParser(prog=f"python -m bench {name}", description=summary)
+    parser = result_parser(name, description)
     parser.add_argument("--scenes", type=listed(), default=(), help="names of scenes; all by default")
     parser.add_argument(
         "--scene-dir", type=Path, help="folder of scenes; default $WIVE_SCENES or ../shared/scenes"
     )
+    return parser
+
+
+def result_parser(name: str, description: str | None) -> argparse.ArgumentParser:
+    """A parser with what every bench takes."""
+    summary = (description or "").split("\n")[0]
+    parser = argparse.ArgumentParser(prog=f"python -m bench {name}", description=summary)
     parser.add_argument(
         "--quick", action="store_true", help="few rays and rounds: shows that it runs, no result"
     )

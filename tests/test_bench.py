@@ -90,6 +90,16 @@ def test_bench_python_agrees_on_closest_hits(bench: Callable[..., dict[str, Any]
     assert all(row["p50_us"] > 0 for row in content["single"])
 
 
+def test_bench_pareto_finds_no_leak_where_none_is_promised(bench: Callable[..., dict[str, Any]]) -> None:
+    means = {row["contender"]: row for row in bench("pareto")["means"]}
+    assert {"fast", "watertight", "compressed", "exact"} <= means.keys()
+    for name in ("watertight", "compressed", "exact"):
+        assert means[name]["leaks"] == 0
+    assert means["exact"]["wrong"] == 0
+    assert means["exact"]["t_worst"] < 0.51
+    assert all(row["mrays"] > 0 for row in means.values())
+
+
 def test_a_tiled_scene_holds_every_copy(bench: Callable[..., dict[str, Any]]) -> None:
     from_one, from_six = (
         bench("build", "--scenes", name, "--threads", "1", "--quality", "medium")["trees"][0]["triangles"]

@@ -62,26 +62,6 @@ def test_closed_sphere_never_leaks_from_anywhere_inside(backend: str) -> None:
     )
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("place", PLACES)
-@pytest.mark.parametrize("scale", SCALES)
-def test_a_million_rays_at_vertices_and_edges_never_leak(scale: float, place: tuple[float, ...]) -> None:
-    random = np.random.default_rng(11)
-    vertices, faces = sphere(6, radius=scale * (1000.0 if any(place) else 1.0))
-    vertices = (vertices + scale * np.array(place)).astype(np.float32)
-    chosen = vertices[faces[random.integers(len(faces), size=1_000_000)]].astype(np.float64)
-    weight = random.random((len(chosen), 1)) * random.integers(2, size=(len(chosen), 1))
-    targets = chosen[:, 0] * (1 - weight) + chosen[:, 1] * weight
-    low, high = vertices.min(axis=0).astype(np.float64), vertices.max(axis=0)
-    origins = ((low + high) / 2 + 0.25 * (high - low) * random.uniform(-1, 1, targets.shape)).astype(
-        np.float32
-    )
-    scene = wive.Scene(vertices, faces)
-    directions = (targets - origins).astype(np.float32)
-    assert scene.intersect(origins, directions).mask.all()
-    assert scene.occluded(origins, directions).all()
-
-
 def test_fast_mode_does_leak_so_these_rays_can_tell(backend: str) -> None:
     vertices, faces = sphere(5)
     leaks = 0
