@@ -3,6 +3,7 @@
 import itertools
 import subprocess
 import sys
+import tempfile
 
 import numpy as np
 import pytest
@@ -272,5 +273,6 @@ def test_more_hits_than_memory_holds_are_a_memory_error_and_nothing_leaks(thread
         capture_output=True,
         text=True,
         timeout=100,
+        cwd=tempfile.gettempdir(),  # not where a wive without its core could be imported from
     )
     assert run.stdout.split() == ["refused", "2000000"] * 3, run.stderr
