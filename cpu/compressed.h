@@ -36,16 +36,22 @@ struct alignas(32) CompressedBlock {
 
     std::uint32_t corners[2];
 
-    std::uint32_t vertices() const { return corners[1] >> 20; }
-    unsigned used() const { return corners[1] >> 16 & 15u; }
-    int corner(int k, int lane) const { return static_cast<int>(corners[k >> 1] >> (16 * (k & 1) + 4 * lane) & 7u); }
+    [[gnu::always_inline]] std::uint32_t vertices() const { return corners[1] >> 20; }
+    [[gnu::always_inline]] unsigned used() const { return corners[1] >> 16 & 15u; }
+    [[gnu::always_inline]] int corner(int k, int lane) const {
+        return static_cast<int>(corners[k >> 1] >> (16 * (k & 1) + 4 * lane) & 7u);
+    }
 
-    const float* row(std::size_t axis) const { return reinterpret_cast<const float*>(this) + 2 + vertices() * axis; }
-    float vertex(int k, int axis, int lane) const { return row(static_cast<std::size_t>(axis))[corner(k, lane)]; }
-    std::int32_t prim_at(int lane) const { return std::bit_cast<std::int32_t>(row(3)[lane]); }
+    [[gnu::always_inline]] const float* row(std::size_t axis) const {
+        return reinterpret_cast<const float*>(this) + 2 + vertices() * axis;
+    }
+    [[gnu::always_inline]] float vertex(int k, int axis, int lane) const {
+        return row(static_cast<std::size_t>(axis))[corner(k, lane)];
+    }
+    [[gnu::always_inline]] std::int32_t prim_at(int lane) const { return std::bit_cast<std::int32_t>(row(3)[lane]); }
 
     static constexpr std::size_t units(std::size_t vertices) { return vertices / 2; }
-    const CompressedBlock* next() const { return this + units(vertices()); }
+    [[gnu::always_inline]] const CompressedBlock* next() const { return this + units(vertices()); }
 };
 static_assert(sizeof(CompressedBlock) == unit_bytes);
 

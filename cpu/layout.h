@@ -28,9 +28,10 @@ struct alignas(32) TriangleBlock {
     float rows[9][block_width];
     std::int32_t prim[block_width];
 
-    float vertex(int k, int axis, int lane) const { return rows[3 * k + axis][lane]; }  // watertight
-    std::int32_t prim_at(int lane) const { return prim[lane]; }
-    const TriangleBlock* next() const { return this + 1; }
+    // Always inlined, as all that kernels call: a copy compiled for one instruction set must not be linked into another.
+    [[gnu::always_inline]] float vertex(int k, int axis, int lane) const { return rows[3 * k + axis][lane]; }  // but in `fast` trees
+    [[gnu::always_inline]] std::int32_t prim_at(int lane) const { return prim[lane]; }
+    [[gnu::always_inline]] const TriangleBlock* next() const { return this + 1; }
 };
 static_assert(sizeof(TriangleBlock) == 160);
 

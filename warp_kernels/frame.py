@@ -53,6 +53,13 @@ def component(v: wp.vec3, axis: int):
 
 
 @wp.func
+def axes_of(longest: int):
+    """The axes in the order of the triangle tests' sheared space, the direction's longest last."""
+    x = wp.where(longest == 2, 0, longest + 1)
+    return wp.vec3i(x, wp.where(x == 2, 0, x + 1), longest)
+
+
+@wp.func
 def load_frame(
     center: wp.vec3, extent: wp.vec3, origin: wp.vec3, direction: wp.vec3, tmin: float, tmax: float
 ):

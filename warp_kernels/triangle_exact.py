@@ -12,7 +12,7 @@ from wive.warp_kernels.exact_native import (
     may_meet,
     solve_exactly,
 )
-from wive.warp_kernels.frame import RayFrame, component
+from wive.warp_kernels.frame import RayFrame, axes_of, component
 from wive.warp_kernels.handle import BLOCK_WIDTH, NO_PRIM
 from wive.warp_kernels.lanes import load_float, lowest_lane, product, without_gradient
 from wive.warp_kernels.query_exact import ExactBest
@@ -35,13 +35,6 @@ def slope_of(slope: wp.float64):
 def block_of(place: int):
     """The block of a triangle's place."""
     return place & -8
-
-
-@wp.func
-def axes_of(longest: int):
-    """The axes in the order of the sheared space, the direction's longest last."""
-    x = wp.where(longest == 2, 0, longest + 1)
-    return wp.vec3i(x, wp.where(x == 2, 0, x + 1), longest)
 
 
 def exact_triangles(lanes: SimpleNamespace, form: SimpleNamespace, kept: int) -> SimpleNamespace:

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 # Warp compiles these functions: to mypy they are no Python.
 import warp as wp
 
-from wive.warp_kernels.frame import RayFrame, component
+from wive.warp_kernels.frame import RayFrame, axes_of, component
 from wive.warp_kernels.lanes import load_float, lowest_lane, product, product_double, without_gradient
 
 # What the test keeps of a ray, in words: the axis behind each sheared axis, the origin, the direction (both
@@ -70,11 +70,8 @@ def watertight_triangles(lanes: SimpleNamespace, form: SimpleNamespace, kept: in
     @wp.func
     def prepare(ray: RayFrame, stack: stack_argument):
         """Keep what the test needs of a ray."""
-        z = ray.longest_axis
-        x = wp.where(z == 2, 0, z + 1)
-        y = wp.where(x == 2, 0, x + 1)
-        axes = wp.vec3i(x, y, z)
-        forward = component(ray.direction, z)
+        axes = axes_of(ray.longest_axis)
+        forward = component(ray.direction, axes[2])
         for i in range(3):
             store_word(stack, kept + i, wp.uint32(axes[i]))
             store_word(stack, kept + 3 + i, wp.cast(component(ray.origin, axes[i]), wp.uint32))

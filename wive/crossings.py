@@ -67,8 +67,9 @@ class CrossingQueries:
         """Every triangle that each ray meets with tmin <= t <= tmax, each once, however many there are.
 
         Arguments are those of `intersect`. Each ray's hits come by ascending t, at equal t by ascending prim;
-        the first is what `intersect` returns. A ray through an edge or a vertex meets every triangle there;
-        with accuracy "exact" it passes a closed surface there as often as beside it: parity is always right.
+        the first is what `intersect` returns. A ray through an edge or a vertex meets every triangle there.
+        Not so with accuracy "exact": there a ray passes a closed surface as often as beside the edge, so that
+        parity is always right, and a hit of `intersect` that only touches an edge may be missing.
 
         CPU backends trace once; a hit takes 24 bytes until all are found, then 16. Warp traces twice, to
         count and to fill, and waits for the device in between: CUDA graphs can't capture this query.
