@@ -19,7 +19,20 @@ namespace wive {
 template <class>
 struct NoSlabs;
 
-template <class Isa, template <class> class ForFloat32, template <class> class ForCompressed>
+// What a table, or the part of it that one translation unit makes, is made for.
+using MadeFor = bool (*)(KernelChoice);
+constexpr bool first_hits(KernelChoice choice) {
+    return choice.query == QueryKind::closest || choice.query == QueryKind::any;
+}
+constexpr bool all_hits(KernelChoice choice) { return !first_hits(choice); }
+// The half form: its steps are those of the full form, which counts them.
+constexpr bool all_but_counting(KernelChoice choice) { return !choice.counting; }
+// By distance: what `python -m bench order` compares.
+constexpr bool closest_watertight(KernelChoice choice) {
+    return choice.query == QueryKind::closest && choice.accuracy == Accuracy::watertight;
+}
+
+template <class Isa, template <class> class ForFloat32, template <class> class ForCompressed, MadeFor made_for>
 struct KernelMaker {
     template <QueryKind kind>
     using Query = std::tuple_element_t<static_cast<std::size_t>(kind), std::tuple<ClosestHit, AnyHit, AllHits, CountHits>>;
@@ -38,7 +51,7 @@ struct KernelMaker {
     template <KernelChoice choice, template <class> class Slabs>
     static constexpr auto kernel_with() {
         using Asked = Query<choice.query>;
-        if constexpr (std::is_same_v<Slabs<Isa>, NoSlabs<Isa>>)
+        if constexpr (!made_for(choice) || std::is_same_v<Slabs<Isa>, NoSlabs<Isa>>)
             return NoKernel{};
         else if constexpr (choice.accuracy == Accuracy::fast)
             return Kernel<Slabs, FastTriangles, Asked, choice.counting>{};
@@ -66,9 +79,9 @@ struct KernelMaker {
     }
 };
 
-template <class Isa, template <class> class ForFloat32, template <class> class ForCompressed = NoSlabs>
+template <class Isa, template <class> class ForFloat32, template <class> class ForCompressed, MadeFor made_for>
 constexpr KernelTable make_kernel_table(std::string_view name) {
-    return KernelMaker<Isa, ForFloat32, ForCompressed>::table(name, std::make_index_sequence<kernel_count>());
+    return KernelMaker<Isa, ForFloat32, ForCompressed, made_for>::table(name, std::make_index_sequence<kernel_count>());
 }
 
 }  // namespace wive

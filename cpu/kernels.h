@@ -2,8 +2,8 @@
 #pragma once
 
 #include <array>
-#include <stdexcept>
-#include <string>
+#include <initializer_list>
+#include <optional>
 #include <string_view>
 
 #include "layout.h"
@@ -42,16 +42,14 @@ using TraceBatch = void (*)(const BvhView&, const RayBatch&, const HitBatch&, co
 struct KernelTable {
     std::string_view name;
     std::size_t flight_bytes;  // of the largest kernel
-    std::array<TraceBatch, kernel_count> kernels;
+    std::array<TraceBatch, kernel_count> kernels;  // null: the table was not made for this
 
-    // Throws std::invalid_argument where the table was not made for such nodes.
-    TraceBatch find(KernelChoice choice) const {
-        const TraceBatch kernel = kernels[kernel_index(choice)];
-        if (kernel == nullptr)
-            throw std::invalid_argument("kernel '" + std::string(name) + "' traces float32 nodes only: build with nodes 'float32'");
-        return kernel;
-    }
+    // Throws std::invalid_argument, naming the choice, where the table was not made for it.
+    TraceBatch find(KernelChoice choice) const;
 };
+
+// One table of all the parts' kernels, each from the first part that has it; none where no part is compiled in (null).
+std::optional<KernelTable> join(std::string_view name, std::initializer_list<const KernelTable*> parts);
 
 // Null where this build has no such kernels; whether the machine can run them is dispatch.h's business.
 const KernelTable* avx512_full_kernels();
@@ -60,5 +58,13 @@ const KernelTable* avx512_by_distance_kernels();
 const KernelTable* avx2_kernels();
 const KernelTable* scalar_kernels();
 const KernelTable* scalar_by_distance_kernels();
+
+// Parts of these, each from a translation unit of its own: closest and any hit; all hits and their number.
+const KernelTable* avx512_full_first_hits();
+const KernelTable* avx512_full_all_hits();
+const KernelTable* avx2_first_hits();
+const KernelTable* avx2_all_hits();
+const KernelTable* scalar_first_hits();
+const KernelTable* scalar_all_hits();
 
 }  // namespace wive
