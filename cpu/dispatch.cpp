@@ -2,6 +2,8 @@
 
 #include <stdexcept>
 
+#include "avx512_form.h"
+
 #if defined(__x86_64__)
 #include <cpuid.h>
 #endif
@@ -29,28 +31,29 @@ bool has_avx512() { return false; }
 
 struct Entry {
     std::string_view name;
-    const KernelTable* table;
-    bool runs;
+    const KernelTable* (*kernels)();  // "avx512" is a choice of two, made by the first query that needs it
+    bool compiled, runs;
     std::string_view needs;
 };
 
 // Asked once: every query looks its kernels up, and on a virtual machine one CPUID instruction takes microseconds.
 const std::vector<Entry>& entries() {
     constexpr std::string_view avx512 = "AVX-512 F, VL, DQ or BW", avx2 = "AVX2, FMA, BMI1, BMI2, LZCNT or POPCNT";
+    static const bool x86_64 = avx512_half_kernels() != nullptr;
     static const std::vector<Entry> all = {
-        {"avx512", avx512_full_kernels(), has_avx512(), avx512},
-        {"avx512.full", avx512_full_kernels(), has_avx512(), avx512},
-        {"avx512.half", avx512_half_kernels(), has_avx512(), avx512},
-        {"avx512.distance", avx512_by_distance_kernels(), has_avx512(), avx512},
-        {"avx2", avx2_kernels(), has_avx2(), avx2},
-        {"scalar", scalar_kernels(), true, ""},
-        {"scalar.distance", scalar_by_distance_kernels(), true, ""},
+        {"avx512", avx512_kernels, x86_64, has_avx512(), avx512},
+        {"avx512.full", avx512_full_kernels, x86_64, has_avx512(), avx512},
+        {"avx512.half", avx512_half_kernels, x86_64, has_avx512(), avx512},
+        {"avx512.distance", avx512_by_distance_kernels, x86_64, has_avx512(), avx512},
+        {"avx2", avx2_kernels, x86_64, has_avx2(), avx2},
+        {"scalar", scalar_kernels, true, true, ""},
+        {"scalar.distance", scalar_by_distance_kernels, true, true, ""},
     };
     return all;
 }
 
 std::string why_not(const Entry& entry) {
-    if (entry.table == nullptr) return "this build is for another processor architecture than x86-64";
+    if (!entry.compiled) return "this build is for another processor architecture than x86-64";
     if (!entry.runs) return "this processor lacks " + std::string(entry.needs);
     return "";
 }
@@ -68,7 +71,7 @@ const KernelTable& find_kernels(std::string_view name) {
         if (entry.name != name) continue;
         if (const std::string reason = why_not(entry); !reason.empty())
             throw std::invalid_argument("kernel '" + std::string(name) + "' can't run here: " + reason);
-        return *entry.table;
+        return *entry.kernels();
     }
     throw std::invalid_argument("unknown kernel '" + std::string(name) + "'");
 }
