@@ -27,9 +27,9 @@ constexpr bool first_hits(KernelChoice choice) {
 constexpr bool all_hits(KernelChoice choice) { return !first_hits(choice); }
 // The half form: its steps are those of the full form, which counts them.
 constexpr bool all_but_counting(KernelChoice choice) { return !choice.counting; }
-// By distance: what `python -m bench order` compares.
-constexpr bool closest_watertight(KernelChoice choice) {
-    return choice.query == QueryKind::closest && choice.accuracy == Accuracy::watertight;
+// By distance: what `python -m bench order` and the tests compare.
+constexpr bool closest_inexact(KernelChoice choice) {
+    return choice.query == QueryKind::closest && choice.accuracy != Accuracy::exact;
 }
 
 template <class Isa, template <class> class ForFloat32, template <class> class ForCompressed, MadeFor made_for>

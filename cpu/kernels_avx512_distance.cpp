@@ -7,7 +7,7 @@
 
 namespace wive {
 static constexpr KernelTable table =
-    make_kernel_table<Avx512ByDistance, FullSlabs, NoSlabs, closest_watertight>("avx512.distance");
+    make_kernel_table<Avx512ByDistance, FullSlabs, NoSlabs, closest_inexact>("avx512.distance");
 const KernelTable* avx512_by_distance_kernels() { return &table; }
 }  // namespace wive
 #else

@@ -6,7 +6,7 @@
 namespace wive {
 static constexpr KernelTable stored = make_kernel_table<Scalar, FullSlabs, CompressedSlabs, first_hits>("scalar");
 static constexpr KernelTable by_distance =
-    make_kernel_table<ScalarByDistance, FullSlabs, NoSlabs, closest_watertight>("scalar.distance");
+    make_kernel_table<ScalarByDistance, FullSlabs, NoSlabs, closest_inexact>("scalar.distance");
 const KernelTable* scalar_first_hits() { return &stored; }
 const KernelTable* scalar_by_distance_kernels() { return &by_distance; }
 }  // namespace wive
