@@ -30,9 +30,9 @@ struct CompressedSlabs {
             near_bias[axis] = Float8::all(ray.near_bias[axis]);
             far_bias[axis] = Float8::all(ray.far_bias[axis]);
             near_row[axis] = ray.near_row[axis];
-            far_row[axis] = ray.near_row[axis] ^ node_width;
+            far_row[axis] = ray.far_row[axis];
         }
-        order_shift = 3 * (7 - ray.octant);
+        order_shift = ray.order_shift * 3 / 4;  // three bits a sequence
     }
 
     [[gnu::always_inline]] typename Isa::Order order(const CompressedNode& node) const { return {node.order, order_shift}; }

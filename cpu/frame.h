@@ -40,8 +40,8 @@ struct RayFrame {
     alignas(16) float far_bias[4];
     float tmin, tmax;
     float scale;  // t of the caller's ray = scale * t here
-    std::uint32_t near_row[3];  // in planes from a node's first one: the row that the ray meets first; its far row is the other one
-    unsigned octant;  // bit a: negative on axis a, from the sign of the reciprocal
+    std::uint32_t near_row[3], far_row[3];  // in planes from a node's first one: the rows that the ray meets first and last
+    std::uint32_t order_shift;  // of a node's order, four bits a sequence: the octant's, from back to front
     unsigned longest_axis;
 
     // False where the ray hits nothing by rule: an origin or a direction that is no number or out of range, a
@@ -73,9 +73,13 @@ struct RayFrame {
         const Float4 size = Float4::all(1.0f) / max(abs(scaled), Float4::all(smallest));
         const Float4 reciprocal = flip_sign(size, scaled);
         const Float4 distance = relative * reciprocal, slack = size * Float4::all(reach * slack_factor);
-        octant = sign_bits(scaled) & 7u;
+        const unsigned octant = sign_bits(scaled) & 7u;  // bit a: negative on axis a, from the sign of the reciprocal
+        order_shift = 4 * (7 - octant);  // the stack wants the farthest child first, and octant 7 - o is octant o backwards
         longest_axis = static_cast<unsigned>(std::countr_zero(less_equal(Float4::all(longest), lengths)));
-        for (unsigned axis = 0; axis < 3; ++axis) near_row[axis] = node_width * (2 * axis + (octant >> axis & 1u));
+        for (unsigned axis = 0; axis < 3; ++axis) {
+            near_row[axis] = node_width * (2 * axis + (octant >> axis & 1u));
+            far_row[axis] = near_row[axis] ^ node_width;
+        }
         caller_origin.store(origin);
         scaled.store(direction);
         reciprocal.store(rdir);

@@ -24,9 +24,9 @@ struct HalfSlabs {
             rdir[axis] = both(ray.rdir[axis], -ray.rdir[axis]);
             bias[axis] = both(ray.near_bias[axis], -ray.far_bias[axis]);
             near_row[axis] = ray.near_row[axis];
-            far_row[axis] = ray.near_row[axis] ^ node_width;
+            far_row[axis] = ray.far_row[axis];
         }
-        order_shift = 4 * (7 - ray.octant);
+        order_shift = ray.order_shift;
     }
 
     WIVE_INLINE typename Isa::Order order(const Node& node) const { return {node.order, order_shift}; }

@@ -70,18 +70,18 @@ private:
         *ends_.node++ = &f;
     }
 
-    // The child on top is next: prefetched now, and waited for in the right queue. Written to all three, and counted
-    // in one: no branch.
-    [[gnu::always_inline]] static void wait(const BvhView& bvh, State& f, Stack::Top top, Ends& ends) {
+    // The child on top is next, unless it may be hidden, which a leaf that was begun may not: prefetched now, and waited
+    // for in the right queue. Written to all three, and counted in one: no branch.
+    [[gnu::always_inline]] static void wait(const BvhView& bvh, State& f, Stack::Top top, bool may_hide, Ends& ends) {
         if constexpr (Query::in_order)
-            while (top.distance() > f.query.tmax) top.move(-1);
+            while (may_hide & (top.distance() > f.query.tmax)) top.move(-1);
         f.top = top;
         const std::uint32_t child = top.child();
         prefetch<Form>(bvh, child);
-        const bool inner = is_inner(child), end = child == end_of_stack;
+        const std::ptrdiff_t inner = is_inner(child), end = child == end_of_stack;
         *ends.node = *ends.leaf = *ends.done = &f;
         ends.node += inner;
-        ends.leaf += !inner & !end;
+        ends.leaf += 1 - inner - end;
         ends.done += end;
     }
 
@@ -94,11 +94,12 @@ private:
             Stack::Top top = f.top;
             f.counters.inner_node();
             visit<Query::in_order>(bvh.template node<Form>(top.child()), Slabs<Isa>(f.ray), f.query.tmax, top);
-            wait(bvh, f, top, ends);
+            wait(bvh, f, top, true, ends);
         }
         ends_ = ends;
     }
 
+    // One block a turn: a leaf of several stays on top, so that the next one is prefetched, and no loop has to be left.
     [[gnu::always_inline]] void test_leaves() {
         const BvhView bvh = bvh_;
         State** const last = ends_.leaf;
@@ -107,12 +108,18 @@ private:
             State& f = **i;
             Stack::Top top = f.top;
             const std::uint32_t child = top.child();
-            f.counters.leaf();
-            const bool finished = test_leaf<Corners>(bvh.template leaf<Form>(child), leaf_block_count(child),
-                                                     Triangles<Isa>(f.ray), f.query, f.counters);
-            if (finished) top = Stack::Top(f.stack);
-            top.move(-1);
-            wait(bvh, f, top, ends);
+            const auto& block = *bvh.template leaf<Form>(child);
+            const bool last_block = leaf_block_count(child) == 1;
+            f.counters.block(block);
+            const bool finished = Triangles<Isa>(f.ray).test(Corners(block), f.query);
+            top.child() = without_first_block(child, block.units());  // no matter if it was the last: above the top then
+            top.move(-static_cast<std::ptrdiff_t>(last_block));
+            if (last_block || finished) f.counters.leaf();
+            if (finished) {
+                top = Stack::Top(f.stack);
+                top.move(-1);
+            }
+            wait(bvh, f, top, last_block, ends);
         }
         ends_ = ends;
     }

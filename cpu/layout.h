@@ -32,6 +32,7 @@ struct alignas(32) TriangleBlock {
     [[gnu::always_inline]] float vertex(int k, int axis, int lane) const { return rows[3 * k + axis][lane]; }  // but in `fast` trees
     [[gnu::always_inline]] std::int32_t prim_at(int lane) const { return prim[lane]; }
     [[gnu::always_inline]] const TriangleBlock* next() const { return this + 1; }
+    [[gnu::always_inline]] static std::size_t units() { return sizeof(TriangleBlock) / 32; }
 };
 static_assert(sizeof(TriangleBlock) == 160);
 
@@ -56,6 +57,10 @@ constexpr std::uint32_t leaf_child(std::size_t unit, std::uint32_t blocks) {
 }
 constexpr std::size_t child_offset(std::uint32_t child) { return std::size_t{child & 0x7ffffff8u} * (unit_bytes / 8); }
 constexpr std::uint32_t leaf_block_count(std::uint32_t child) { return (child & 7u) + 1; }
+// The rest of a leaf of several blocks, the first of which takes so many units.
+constexpr std::uint32_t without_first_block(std::uint32_t child, std::size_t units) {
+    return child + (static_cast<std::uint32_t>(units) << 3) - 1;
+}
 
 // The builder never makes a tree deeper than this (see binary_tree.cpp). One visit pops one entry and pushes
 // at most eight, so a way from the root down leaves at most seven entries a level behind.

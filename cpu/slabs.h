@@ -43,10 +43,9 @@ struct FullSlabs {
             near_bias[axis] = Float8::all(ray.near_bias[axis]);
             far_bias[axis] = Float8::all(ray.far_bias[axis]);
             near_row[axis] = ray.near_row[axis];
-            far_row[axis] = ray.near_row[axis] ^ node_width;
+            far_row[axis] = ray.far_row[axis];
         }
-        // The stack wants the farthest child first, and octant 7 - o is octant o backwards.
-        order_shift = 4 * (7 - ray.octant);
+        order_shift = ray.order_shift;
     }
 
     [[gnu::always_inline]] typename Isa::Order order(const Node& node) const { return {node.order, order_shift}; }
