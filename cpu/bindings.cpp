@@ -2,6 +2,7 @@
 #include <optional>
 #include <span>
 
+#include "avx512_form.h"
 #include "bindings.h"
 #include "dispatch.h"
 #include "exact_source.h"
@@ -128,6 +129,10 @@ PYBIND11_MODULE(_cpu, m, pybind11::mod_gil_not_used()) {
         py::dict names;
         for (const auto& [name, reason] : list_kernels()) names[py::str(name)] = reason;
         return names;
+    });
+    m.def("avx512_form", [] {
+        find_kernels<float>("avx512.full");  // throws where they can't run
+        return avx512_form();
     });
     PyBvhClass bvh(m, "Bvh");
     for_each_precision([&]<class Real>(Real) {

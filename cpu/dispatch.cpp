@@ -2,6 +2,8 @@
 
 #include <stdexcept>
 
+#include "avx512_form.h"
+
 #if defined(__x86_64__)
 #include <cpuid.h>
 #endif
@@ -29,29 +31,30 @@ bool has_avx512() { return false; }
 
 struct Entry {
     std::string_view name;
-    const KernelTable<float>* table;
-    const KernelTable<double>* table64;  // null where the name is for comparisons of float32 traversals only
-    bool runs;
+    const KernelTable<float>* (*kernels)();  // "avx512" is a choice of two, made by the first query that needs it
+    const KernelTable<double>* (*float64_kernels)();  // null where the name is for comparisons of float32 traversals only
+    bool compiled, runs;
     std::string_view needs;
 };
 
 // Asked once: every query looks its kernels up, and on a virtual machine one CPUID instruction takes microseconds.
 const std::vector<Entry>& entries() {
     constexpr std::string_view avx512 = "AVX-512 F, VL, DQ or BW", avx2 = "AVX2, FMA, BMI1, BMI2, LZCNT or POPCNT";
+    static const bool x86_64 = avx512_half_kernels() != nullptr;
     static const std::vector<Entry> all = {
-        {"avx512", avx512_full_kernels(), avx512_float64_kernels(), has_avx512(), avx512},
-        {"avx512.full", avx512_full_kernels(), avx512_float64_kernels(), has_avx512(), avx512},
-        {"avx512.half", avx512_half_kernels(), nullptr, has_avx512(), avx512},
-        {"avx512.distance", avx512_by_distance_kernels(), nullptr, has_avx512(), avx512},
-        {"avx2", avx2_kernels(), avx2_float64_kernels(), has_avx2(), avx2},
-        {"scalar", scalar_kernels(), scalar_float64_kernels(), true, ""},
-        {"scalar.distance", scalar_by_distance_kernels(), nullptr, true, ""},
+        {"avx512", avx512_kernels, avx512_float64_kernels, x86_64, has_avx512(), avx512},
+        {"avx512.full", avx512_full_kernels, avx512_float64_kernels, x86_64, has_avx512(), avx512},
+        {"avx512.half", avx512_half_kernels, nullptr, x86_64, has_avx512(), avx512},
+        {"avx512.distance", avx512_by_distance_kernels, nullptr, x86_64, has_avx512(), avx512},
+        {"avx2", avx2_kernels, avx2_float64_kernels, x86_64, has_avx2(), avx2},
+        {"scalar", scalar_kernels, scalar_float64_kernels, true, true, ""},
+        {"scalar.distance", scalar_by_distance_kernels, nullptr, true, true, ""},
     };
     return all;
 }
 
 std::string why_not(const Entry& entry) {
-    if (entry.table == nullptr) return "this build is for another processor architecture than x86-64";
+    if (!entry.compiled) return "this build is for another processor architecture than x86-64";
     if (!entry.runs) return "this processor lacks " + std::string(entry.needs);
     return "";
 }
@@ -70,10 +73,11 @@ const KernelTable<Real>& find_kernels(std::string_view name) {
         if (entry.name != name) continue;
         if (const std::string reason = why_not(entry); !reason.empty())
             throw std::invalid_argument("kernel '" + std::string(name) + "' can't run here: " + reason);
-        if constexpr (precision_of<Real> == Precision::float32) return *entry.table;
-        else if (entry.table64 != nullptr) return *entry.table64;
+        if constexpr (precision_of<Real> == Precision::float32) return *entry.kernels();
+        else if (entry.float64_kernels != nullptr) return *entry.float64_kernels();
         else
-            throw std::invalid_argument("kernel '" + std::string(name) + "' traces float32 scenes only: give vertices in float32, or use 'avx512', 'avx2' or 'scalar'");
+            throw std::invalid_argument("kernel '" + std::string(name) +
+                                        "' traces float32 scenes only: give vertices in float32, or use 'avx512', 'avx2' or 'scalar'");
     }
     throw std::invalid_argument("unknown kernel '" + std::string(name) + "'");
 }

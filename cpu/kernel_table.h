@@ -19,7 +19,21 @@ namespace wive {
 template <class>
 struct NoSlabs;
 
-template <class Isa, template <class> class ForFloat32, template <class> class ForCompressed>
+// What a table, or the part of it that one translation unit makes, is made for.
+using MadeFor = bool (*)(KernelChoice);
+constexpr bool everything(KernelChoice) { return true; }
+constexpr bool first_hits(KernelChoice choice) {
+    return choice.query == QueryKind::closest || choice.query == QueryKind::any;
+}
+constexpr bool all_hits(KernelChoice choice) { return !first_hits(choice); }
+// The half form: its steps are those of the full form, which counts them.
+constexpr bool all_but_counting(KernelChoice choice) { return !choice.counting; }
+// By distance: what `python -m bench order` compares.
+constexpr bool closest_watertight(KernelChoice choice) {
+    return choice.query == QueryKind::closest && choice.accuracy == Accuracy::watertight;
+}
+
+template <class Isa, template <class> class ForFloat32, template <class> class ForCompressed, MadeFor made_for>
 struct KernelMaker {
     using Real = typename Isa::Real;
 
@@ -41,7 +55,7 @@ struct KernelMaker {
     static constexpr auto kernel_with() {
         using Asked = Query<choice.query>;
         constexpr bool exact_of_doubles = choice.accuracy == Accuracy::exact && precision_of<Real> == Precision::float64;
-        if constexpr (std::is_same_v<Slabs<Isa>, NoSlabs<Isa>> || exact_of_doubles)
+        if constexpr (!made_for(choice) || exact_of_doubles || std::is_same_v<Slabs<Isa>, NoSlabs<Isa>>)
             return NoKernel{};
         else if constexpr (choice.accuracy == Accuracy::fast)
             return Kernel<Slabs, FastTriangles, Asked, choice.counting>{};
@@ -69,9 +83,9 @@ struct KernelMaker {
     }
 };
 
-template <class Isa, template <class> class ForFloat32, template <class> class ForCompressed = NoSlabs>
+template <class Isa, template <class> class ForFloat32, template <class> class ForCompressed, MadeFor made_for>
 constexpr KernelTable<typename Isa::Real> make_kernel_table(std::string_view name) {
-    return KernelMaker<Isa, ForFloat32, ForCompressed>::table(name, std::make_index_sequence<kernel_count>());
+    return KernelMaker<Isa, ForFloat32, ForCompressed, made_for>::table(name, std::make_index_sequence<kernel_count>());
 }
 
 }  // namespace wive

@@ -2,8 +2,8 @@
 #pragma once
 
 #include <array>
-#include <stdexcept>
-#include <string>
+#include <initializer_list>
+#include <optional>
 #include <string_view>
 
 #include "layout.h"
@@ -45,16 +45,14 @@ template <class Real>
 struct KernelTable {
     std::string_view name;
     std::size_t flight_bytes;  // of the largest kernel
-    std::array<TraceBatch<Real>, kernel_count> kernels;
+    std::array<TraceBatch<Real>, kernel_count> kernels;  // null: the table was not made for this
 
-    // Throws std::invalid_argument where the table was not made for such nodes.
-    TraceBatch<Real> find(KernelChoice choice) const {
-        const TraceBatch<Real> kernel = kernels[kernel_index(choice)];
-        if (kernel == nullptr)
-            throw std::invalid_argument("kernel '" + std::string(name) + "' traces float32 nodes only: build with nodes 'float32'");
-        return kernel;
-    }
+    // Throws std::invalid_argument, naming the choice, where the table was not made for it.
+    TraceBatch<Real> find(KernelChoice choice) const;
 };
+
+// One table of all the parts' kernels, each from the first part that has it; none where no part is compiled in (null).
+std::optional<KernelTable<float>> join(std::string_view name, std::initializer_list<const KernelTable<float>*> parts);
 
 // Null where this build has no such kernels; whether the machine can run them is dispatch.h's business.
 const KernelTable<float>* avx512_full_kernels();
@@ -67,5 +65,13 @@ const KernelTable<float>* scalar_by_distance_kernels();
 const KernelTable<double>* avx512_float64_kernels();
 const KernelTable<double>* avx2_float64_kernels();
 const KernelTable<double>* scalar_float64_kernels();
+
+// Parts of these, each from a translation unit of its own: closest and any hit; all hits and their number.
+const KernelTable<float>* avx512_full_first_hits();
+const KernelTable<float>* avx512_full_all_hits();
+const KernelTable<float>* avx2_first_hits();
+const KernelTable<float>* avx2_all_hits();
+const KernelTable<float>* scalar_first_hits();
+const KernelTable<float>* scalar_all_hits();
 
 }  // namespace wive

@@ -8,7 +8,7 @@
 #include "slabs.h"
 
 namespace wive {
-static constexpr KernelTable<double> table = make_kernel_table<Float64<Avx2>, FullSlabs, CompressedSlabs>("avx2");
+static constexpr KernelTable<double> table = make_kernel_table<Float64<Avx2>, FullSlabs, CompressedSlabs, everything>("avx2");
 const KernelTable<double>* avx2_float64_kernels() { return &table; }
 }  // namespace wive
 #else

@@ -2,20 +2,16 @@
 
 #if defined(__AVX512F__)
 #include "compressed_slabs.h"
-#include "half_slabs_avx512.h"
 #include "kernel_table.h"
 #include "simd_avx512.h"
 #include "slabs.h"
 
 namespace wive {
-static constexpr KernelTable<float> full = make_kernel_table<Avx512, FullSlabs, CompressedSlabs>("avx512.full");
-static constexpr KernelTable<float> half = make_kernel_table<Avx512, HalfSlabs>("avx512.half");
-const KernelTable<float>* avx512_full_kernels() { return &full; }
-const KernelTable<float>* avx512_half_kernels() { return &half; }
+static constexpr KernelTable<float> table = make_kernel_table<Avx512, FullSlabs, CompressedSlabs, first_hits>("avx512.full");
+const KernelTable<float>* avx512_full_first_hits() { return &table; }
 }  // namespace wive
 #else
 namespace wive {
-const KernelTable<float>* avx512_full_kernels() { return nullptr; }
-const KernelTable<float>* avx512_half_kernels() { return nullptr; }
+const KernelTable<float>* avx512_full_first_hits() { return nullptr; }
 }  // namespace wive
 #endif

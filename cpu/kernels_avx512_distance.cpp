@@ -6,7 +6,8 @@
 #include "slabs.h"
 
 namespace wive {
-static constexpr KernelTable<float> table = make_kernel_table<Avx512ByDistance, FullSlabs>("avx512.distance");
+static constexpr KernelTable<float> table =
+    make_kernel_table<Avx512ByDistance, FullSlabs, NoSlabs, closest_watertight>("avx512.distance");
 const KernelTable<float>* avx512_by_distance_kernels() { return &table; }
 }  // namespace wive
 #else

@@ -8,7 +8,7 @@
 #include "slabs.h"
 
 namespace wive {
-static constexpr KernelTable<double> table = make_kernel_table<Float64<Avx512>, FullSlabs, CompressedSlabs>("avx512");
+static constexpr KernelTable<double> table = make_kernel_table<Float64<Avx512>, FullSlabs, CompressedSlabs, everything>("avx512");
 const KernelTable<double>* avx512_float64_kernels() { return &table; }
 }  // namespace wive
 #else

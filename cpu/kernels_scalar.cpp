@@ -4,8 +4,9 @@
 #include "slabs.h"
 
 namespace wive {
-static constexpr KernelTable<float> stored = make_kernel_table<Scalar, FullSlabs, CompressedSlabs>("scalar");
-static constexpr KernelTable<float> by_distance = make_kernel_table<ScalarByDistance, FullSlabs>("scalar.distance");
-const KernelTable<float>* scalar_kernels() { return &stored; }
+static constexpr KernelTable<float> stored = make_kernel_table<Scalar, FullSlabs, CompressedSlabs, first_hits>("scalar");
+static constexpr KernelTable<float> by_distance =
+    make_kernel_table<ScalarByDistance, FullSlabs, NoSlabs, closest_watertight>("scalar.distance");
+const KernelTable<float>* scalar_first_hits() { return &stored; }
 const KernelTable<float>* scalar_by_distance_kernels() { return &by_distance; }
 }  // namespace wive

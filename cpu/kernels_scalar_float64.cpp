@@ -5,6 +5,6 @@
 #include "slabs.h"
 
 namespace wive {
-static constexpr KernelTable<double> table = make_kernel_table<Float64<Scalar>, FullSlabs, CompressedSlabs>("scalar");
+static constexpr KernelTable<double> table = make_kernel_table<Float64<Scalar>, FullSlabs, CompressedSlabs, everything>("scalar");
 const KernelTable<double>* scalar_float64_kernels() { return &table; }
 }  // namespace wive

@@ -124,6 +124,8 @@ def test_backends_lists_each_with_its_reason(capsys):
     names = [line.split()[0] for line in lines if not line.startswith(" ")]
     assert names == list(wive.backends())
     assert "usable" in lines[2]
+    form = wive.backends()["avx512"].form
+    assert lines[0].endswith(f"{form} form" if form else wive.backends()["avx512"].reason)
     devices = [line.split()[0] for line in lines if line.startswith(" ")]
     assert devices == list(wive.backends()["warp"].devices)
 

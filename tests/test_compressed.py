@@ -246,13 +246,17 @@ def test_a_leaf_of_many_triangles_without_shared_vertices_is_whole() -> None:
     assert max(reference & 7 for _, _, reference in walk(bvh) if reference >= LEAF) == 7
 
 
-def test_a_kernel_without_a_compressed_form_says_so() -> None:
-    if _cpu.kernels()["scalar.distance"]:
-        pytest.skip("no such kernel here")
-    bvh = _cpu.Bvh(*TRIANGLE, nodes="compressed")
-    rays = random_rays(1, 1)
-    with pytest.raises(ValueError, match=r"^kernel 'scalar.distance' traces float32 nodes only"):
-        bvh.intersect("scalar.distance", *rays, ZERO, INFINITE)
+def test_a_kernel_says_what_it_was_not_made_for() -> None:
+    compressed, fast = _cpu.Bvh(*TRIANGLE, nodes="compressed"), _cpu.Bvh(*TRIANGLE, "fast")
+    rays = *random_rays(1, 1), ZERO, INFINITE
+    begin = "^kernel 'scalar.distance' was not made for query "
+    end = ": 'avx512', 'avx2' and 'scalar' are made for everything$"
+    with pytest.raises(ValueError, match=f"{begin}'closest', accuracy 'watertight', nodes 'compressed'{end}"):
+        compressed.intersect("scalar.distance", *rays)
+    with pytest.raises(ValueError, match=f"{begin}'count', accuracy 'fast', nodes 'float32'{end}"):
+        fast.count("scalar.distance", *rays)
+    with pytest.raises(ValueError, match=f"{begin}'any', accuracy 'fast', nodes 'float32' with stats{end}"):
+        fast.occluded("scalar.distance", *rays, stats=True)
 
 
 def test_scenes_keep_their_nodes_when_saved_and_pickled(tmp_path: Path) -> None:

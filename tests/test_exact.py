@@ -57,7 +57,7 @@ def test_hits_are_those_of_exact_arithmetic(backend: str, name: str) -> None:
     assert len(wrong_rays(answers(backend, hard_set(name), ZERO, INFINITE), right)) == 0
 
 
-@pytest.mark.parametrize("kernel", [name for name in CPU_KERNELS if "." in name])
+@pytest.mark.parametrize("kernel", [name for name in CPU_KERNELS if name.endswith((".full", ".half"))])
 @pytest.mark.parametrize("name", ["small integers", "sphere far away", "mixed exponents"])
 def test_other_forms_of_the_kernels_are_as_exact(kernel: str, name: str) -> None:
     assert len(wrong_rays(answers(kernel, hard_set(name), ZERO, INFINITE), truth_of(name))) == 0
@@ -155,7 +155,7 @@ def test_small_scenes_of_few_bits_are_exact(
         return
     right = truth(*rays, ZERO, INFINITE)
     bvh = _cpu.Bvh(vertices, faces, "exact")
-    for kernel in CPU_KERNELS:
+    for kernel in (name for name in CPU_KERNELS if not name.endswith(".distance")):
         t, prim, uv, _ = bvh.intersect(kernel, rays.origins, rays.directions, ZERO, INFINITE)
         occluded, _ = bvh.occluded(kernel, rays.origins, rays.directions, ZERO, INFINITE)
         assert len(wrong_rays(Truth(t, prim, uv, occluded), right)) == 0

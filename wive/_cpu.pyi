@@ -22,6 +22,13 @@ def kernels() -> dict[str, str]:
     sorting children by distance for comparisons, "avx512.distance" and "scalar.distance".
     """
 
+def avx512_form() -> Literal["full", "half"]:
+    """The form of the slab test that kernel "avx512" uses here, as the first query with it decides.
+
+    Raises ValueError where this machine can't run either, or where the environment variable
+    WIVE_AVX512_FORM is none of "full", "half" and "race".
+    """
+
 class Bvh:
     """The 8-wide tree over one mesh: never changed, shared by every backend."""
 

@@ -22,6 +22,20 @@ class Backend:
         """The backend's devices by name, each usable or not; none for CPU backends."""
         return {}
 
+    @property
+    def form(self) -> str:
+        """The form of the slab test, for the backend that has two and is usable; else empty."""
+        return ""
+
+
+class Avx512Backend(Backend):
+    """The backend that uses the better of two forms; on some machines, asking for it races them first."""
+
+    @property
+    def form(self) -> str:
+        """ "full" or "half", by what is faster on this machine or by the environment: WIVE_AVX512_FORM."""
+        return _cpu.avx512_form() if self.usable else ""
+
 
 class WarpBackend(Backend):
     """The backend that has devices; looking at them starts Warp."""
@@ -40,7 +54,8 @@ def backends() -> dict[str, Backend]:
     found = {}
     for name in CPU_BACKENDS:
         reason = kernels.get(name, "not compiled into this build of wive: it needs an x86-64 compiler")
-        found[name] = Backend(usable=not reason, reason=reason)
+        kind = Avx512Backend if name == "avx512" else Backend
+        found[name] = kind(usable=not reason, reason=reason)
     reason = warp_problem()
     found[WARP] = WarpBackend(usable=not reason, reason=reason)
     return found

@@ -122,7 +122,9 @@ def _scene(options: Namespace, vertices: NDArray[Any], faces: NDArray[Any]) -> S
 
 
 def _usable(backend: Backend) -> str:
-    return "usable" if backend.usable else f"not usable: {backend.reason}"
+    if not backend.usable:
+        return f"not usable: {backend.reason}"
+    return f"usable, {backend.form} form" if backend.form else "usable"
 
 
 def _tracer(scene: Scene) -> str:
