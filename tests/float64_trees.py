@@ -4,6 +4,7 @@ from fractions import Fraction
 from typing import Any
 
 import numpy as np
+import pytest
 from meshes import sphere
 
 from wive import _cpu
@@ -12,13 +13,19 @@ Mesh = tuple[np.ndarray, np.ndarray]
 Closest = tuple[np.ndarray, np.ndarray, np.ndarray]
 
 NODES = ("float32", "compressed")
+ACCURACIES = ("fast", "watertight")
 UTM = (500000.123, 4649776.5, 312.7)
+PLACES = [(0.0, 0.0, 0.0), UTM, (-3e9, 2e9, 1e9), (1e15, 0.0, -1e15)]
 
 
 def kernels() -> list[str]:
     """Those of float64 trees that this machine can run."""
     usable = _cpu.kernels()
     return [name for name in ("avx512", "avx2", "scalar") if not usable[name]]
+
+
+each_kernel = pytest.mark.parametrize("kernel", kernels())
+each_form = pytest.mark.parametrize("nodes", NODES)
 
 
 def sphere64(level: int, radius: float = 1.0, place: tuple[float, ...] = (0.0, 0.0, 0.0)) -> Mesh:
