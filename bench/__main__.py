@@ -14,6 +14,7 @@ BENCHES = {
     "pareto": "speed against leaks, wrong triangles and the error of t, with Embree and Warp",
     "python": "what a Python user sees: embreex, trimesh, Warp and wive, NumPy in and out",
     "quality": 'what quality="high" saves in steps per ray and costs in build time',
+    "quote": "not a bench: writes the tables of docs/benchmarks.md from bench/results",
 }
 
 

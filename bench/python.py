@@ -27,7 +27,7 @@ matplotlib.use("Agg")
 from matplotlib import pyplot
 from matplotlib.figure import Figure
 
-SCENES = ("living_room", "bmw_m6", "bathroom_salledebain")
+SCENES = ("living_room", "bmw_m6", "bathroom_salledebain", "furball_embree_tubes")
 RAY_KINDS = ("primary", "diffuse", "random")
 RAYS, QUICK_RAYS = 131_072, 4_096
 # All hits: trimesh casts every ray again from each of its hits.

@@ -63,7 +63,7 @@ std::string_view avx512_form() {
     return form;
 }
 
-const KernelTable* avx512_kernels() {
+const KernelTable<float>* avx512_kernels() {
     static const auto table =
         join("avx512", {avx512_form() == half ? avx512_half_kernels() : nullptr, avx512_full_kernels()});
     return table ? &*table : nullptr;

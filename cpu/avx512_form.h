@@ -12,6 +12,6 @@ namespace wive {
 std::string_view avx512_form();
 
 // The kernels of that form; of full where half has none (compressed nodes, stats). Null where none is compiled in.
-const KernelTable* avx512_kernels();
+const KernelTable<float>* avx512_kernels();
 
 }  // namespace wive

@@ -50,8 +50,9 @@ struct alignas(32) CompressedBlock {
     }
     [[gnu::always_inline]] std::int32_t prim_at(int lane) const { return std::bit_cast<std::int32_t>(row(3)[lane]); }
 
-    static constexpr std::size_t units(std::size_t vertices) { return vertices / 2; }
-    [[gnu::always_inline]] const CompressedBlock* next() const { return this + units(vertices()); }
+    [[gnu::always_inline]] static constexpr std::size_t units(std::size_t vertices) { return vertices / 2; }
+    [[gnu::always_inline]] std::size_t units() const { return units(vertices()); }
+    [[gnu::always_inline]] const CompressedBlock* next() const { return this + units(); }
 };
 static_assert(sizeof(CompressedBlock) == unit_bytes);
 

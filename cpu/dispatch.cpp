@@ -31,7 +31,8 @@ bool has_avx512() { return false; }
 
 struct Entry {
     std::string_view name;
-    const KernelTable* (*kernels)();  // "avx512" is a choice of two, made by the first query that needs it
+    const KernelTable<float>* (*kernels)();  // "avx512" is a choice of two, made by the first query that needs it
+    const KernelTable<double>* (*float64_kernels)();  // null where the name is for comparisons of float32 traversals only
     bool compiled, runs;
     std::string_view needs;
 };
@@ -41,13 +42,13 @@ const std::vector<Entry>& entries() {
     constexpr std::string_view avx512 = "AVX-512 F, VL, DQ or BW", avx2 = "AVX2, FMA, BMI1, BMI2, LZCNT or POPCNT";
     static const bool x86_64 = avx512_half_kernels() != nullptr;
     static const std::vector<Entry> all = {
-        {"avx512", avx512_kernels, x86_64, has_avx512(), avx512},
-        {"avx512.full", avx512_full_kernels, x86_64, has_avx512(), avx512},
-        {"avx512.half", avx512_half_kernels, x86_64, has_avx512(), avx512},
-        {"avx512.distance", avx512_by_distance_kernels, x86_64, has_avx512(), avx512},
-        {"avx2", avx2_kernels, x86_64, has_avx2(), avx2},
-        {"scalar", scalar_kernels, true, true, ""},
-        {"scalar.distance", scalar_by_distance_kernels, true, true, ""},
+        {"avx512", avx512_kernels, avx512_float64_kernels, x86_64, has_avx512(), avx512},
+        {"avx512.full", avx512_full_kernels, avx512_float64_kernels, x86_64, has_avx512(), avx512},
+        {"avx512.half", avx512_half_kernels, nullptr, x86_64, has_avx512(), avx512},
+        {"avx512.distance", avx512_by_distance_kernels, nullptr, x86_64, has_avx512(), avx512},
+        {"avx2", avx2_kernels, avx2_float64_kernels, x86_64, has_avx2(), avx2},
+        {"scalar", scalar_kernels, scalar_float64_kernels, true, true, ""},
+        {"scalar.distance", scalar_by_distance_kernels, nullptr, true, true, ""},
     };
     return all;
 }
@@ -66,14 +67,22 @@ std::vector<std::pair<std::string, std::string>> list_kernels() {
     return list;
 }
 
-const KernelTable& find_kernels(std::string_view name) {
+template <class Real>
+const KernelTable<Real>& find_kernels(std::string_view name) {
     for (const Entry& entry : entries()) {
         if (entry.name != name) continue;
         if (const std::string reason = why_not(entry); !reason.empty())
             throw std::invalid_argument("kernel '" + std::string(name) + "' can't run here: " + reason);
-        return *entry.kernels();
+        if constexpr (precision_of<Real> == Precision::float32) return *entry.kernels();
+        else if (entry.float64_kernels != nullptr) return *entry.float64_kernels();
+        else
+            throw std::invalid_argument("kernel '" + std::string(name) +
+                                        "' traces float32 scenes only: give vertices in float32, or use 'avx512', 'avx2' or 'scalar'");
     }
     throw std::invalid_argument("unknown kernel '" + std::string(name) + "'");
 }
+
+template const KernelTable<float>& find_kernels(std::string_view);
+template const KernelTable<double>& find_kernels(std::string_view);
 
 }  // namespace wive

@@ -14,7 +14,7 @@ namespace wive {
 template <class Frame, class Query, class Counters>
 struct alignas(64) Flight {
     Frame ray;
-    Query query{0, 0};
+    Query query{};
     [[no_unique_address]] Counters counters;
     Stack::Top top;
     std::size_t index = 0;  // of the ray in its batch
@@ -23,12 +23,15 @@ struct alignas(64) Flight {
 
 template <class Isa, template <class> class Slabs, template <class> class Triangles, class Query, class Counters>
 class InFlight {
+    using Rays = RayBatch<typename Isa::Real>;
+    using Hits = HitBatch<typename Isa::Real>;
+
 public:
     using State = Flight<typename Triangles<Isa>::Frame, Query, Counters>;
     using Form = typename Slabs<Isa>::Form;
     using Corners = typename Form::template Corners<Isa>;
 
-    [[gnu::always_inline]] InFlight(const BvhView& bvh, const RayBatch& rays, const HitBatch& hits,
+    [[gnu::always_inline]] InFlight(const BvhView& bvh, const Rays& rays, const Hits& hits,
                                     const RaySource& source, std::byte* scratch)
         : bvh_(bvh), rays_(rays), hits_(hits), source_(source), flights_(reinterpret_cast<State*>(scratch)) {}
 
@@ -57,7 +60,7 @@ private:
                 end_ = next_;
                 return;
             }
-            new (&f.query) Query{0, 0};  // in place: a temporary copied over would stall on its own stores
+            new (&f.query) Query{};  // in place: a temporary copied over would stall on its own stores
             f.counters = Counters{};
             if (f.ray.load(bvh_, rays_, next_)) break;
             f.query.write(hits_, next_, 1);
@@ -70,18 +73,18 @@ private:
         *ends_.node++ = &f;
     }
 
-    // The child on top is next: prefetched now, and waited for in the right queue. Written to all three, and counted
-    // in one: no branch.
-    [[gnu::always_inline]] static void wait(const BvhView& bvh, State& f, Stack::Top top, Ends& ends) {
+    // The child on top is next, unless it may be hidden, which a leaf that was begun may not: prefetched now, and waited
+    // for in the right queue. Written to all three, and counted in one: no branch.
+    [[gnu::always_inline]] static void wait(const BvhView& bvh, State& f, Stack::Top top, bool may_hide, Ends& ends) {
         if constexpr (Query::in_order)
-            while (top.distance() > f.query.tmax) top.move(-1);
+            while (may_hide & (top.distance() > f.query.interval.reach())) top.move(-1);
         f.top = top;
         const std::uint32_t child = top.child();
         prefetch<Form>(bvh, child);
-        const bool inner = is_inner(child), end = child == end_of_stack;
+        const std::ptrdiff_t inner = is_inner(child), end = child == end_of_stack;
         *ends.node = *ends.leaf = *ends.done = &f;
         ends.node += inner;
-        ends.leaf += !inner & !end;
+        ends.leaf += 1 - inner - end;
         ends.done += end;
     }
 
@@ -93,12 +96,13 @@ private:
             State& f = **i;
             Stack::Top top = f.top;
             f.counters.inner_node();
-            visit<Query::in_order>(bvh.template node<Form>(top.child()), Slabs<Isa>(f.ray), f.query.tmax, top);
-            wait(bvh, f, top, ends);
+            visit<Query::in_order>(bvh.template node<Form>(top.child()), Slabs<Isa>(f.ray), f.query.interval.reach(), top);
+            wait(bvh, f, top, true, ends);
         }
         ends_ = ends;
     }
 
+    // One block a turn: a leaf of several stays on top, so that the next one is prefetched, and no loop has to be left.
     [[gnu::always_inline]] void test_leaves() {
         const BvhView bvh = bvh_;
         State** const last = ends_.leaf;
@@ -107,12 +111,18 @@ private:
             State& f = **i;
             Stack::Top top = f.top;
             const std::uint32_t child = top.child();
-            f.counters.leaf();
-            const bool finished = test_leaf<Corners>(bvh.template leaf<Form>(child), leaf_block_count(child),
-                                                     Triangles<Isa>(f.ray), f.query, f.counters);
-            if (finished) top = Stack::Top(f.stack);
-            top.move(-1);
-            wait(bvh, f, top, ends);
+            const auto& block = *bvh.template leaf<Form>(child);
+            const bool last_block = leaf_block_count(child) == 1;
+            f.counters.block(block);
+            const bool finished = Triangles<Isa>(f.ray).test(Corners(block), f.query);
+            top.child() = without_first_block(child, block.units());  // no matter if it was the last: above the top then
+            top.move(-static_cast<std::ptrdiff_t>(last_block));
+            if (last_block || finished) f.counters.leaf();
+            if (finished) {
+                top = Stack::Top(f.stack);
+                top.move(-1);
+            }
+            wait(bvh, f, top, last_block, ends);
         }
         ends_ = ends;
     }
@@ -129,8 +139,8 @@ private:
     }
 
     const BvhView bvh_;
-    const RayBatch rays_;
-    const HitBatch hits_;
+    const Rays rays_;
+    const Hits hits_;
     const RaySource source_;
     State* flights_;
     State *at_node_[max_in_flight + 1], *at_leaf_[max_in_flight + 1], *done_[max_in_flight + 1];
@@ -139,8 +149,9 @@ private:
 };
 
 template <class Isa, template <class> class Slabs, template <class> class Triangles, class Query, class Counters>
-void trace_batch(const BvhView& bvh, const RayBatch& rays, const HitBatch& hits, const RaySource& source,
-                 unsigned in_flight, std::byte* scratch) {
+void trace_batch(const BvhView& bvh, const RayBatch<typename Isa::Real>& rays,
+                 const HitBatch<typename Isa::Real>& hits, const RaySource& source, unsigned in_flight,
+                 std::byte* scratch) {
     if (in_flight <= 1)
         trace_one_by_one<Isa, Slabs, Triangles, Query, Counters>(bvh, rays, hits, source);
     else

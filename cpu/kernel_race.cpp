@@ -53,8 +53,8 @@ public:
         }
     }
 
-    Mesh mesh() const { return {vertices_.data(), vertices_.size() / 3, faces_.data(), faces_.size() / 3}; }
-    RayBatch rays() const { return {origins_.data(), directions_.data(), &tmin_, &tmax_, 0, 0}; }
+    Mesh<float> mesh() const { return {vertices_.data(), vertices_.size() / 3, faces_.data(), faces_.size() / 3}; }
+    RayBatch<float> rays() const { return {origins_.data(), directions_.data(), &tmin_, &tmax_, 0, 0}; }
 
 private:
     std::vector<float> vertices_, origins_, directions_;
@@ -64,13 +64,13 @@ private:
 
 }  // namespace
 
-bool is_faster(const KernelTable& challenger, const KernelTable& holder) {
+bool is_faster(const KernelTable<float>& challenger, const KernelTable<float>& holder) {
     constexpr KernelChoice choice = {QueryKind::closest, Accuracy::watertight, NodeForm::float32, false};
     const Course course;
     const Bvh bvh(course.mesh(), {.accuracy = choice.accuracy, .nodes = choice.nodes, .threads = 1});
     std::vector<float> t(ray_count);
     std::vector<std::int32_t> prim(ray_count);
-    HitBatch hits;
+    HitBatch<float> hits;
     hits.t = t.data();
     hits.prim = prim.data();
 
@@ -82,7 +82,7 @@ bool is_faster(const KernelTable& challenger, const KernelTable& holder) {
     for (auto& of_table : best) std::fill(std::begin(of_table), std::end(of_table), std::numeric_limits<double>::infinity());
     for (int turn = 0; turn < turns; ++turn)
         for (std::size_t table = 0; table < 2; ++table) {
-            const TraceBatch kernel = tables[table]->find(choice);
+            const TraceBatch<float> kernel = tables[table]->find(choice);
             for (std::size_t way = 0; way < 2; ++way)
                 // Several passes a turn: some processors lower their clock for 512-bit arithmetic, and need the better
                 // part of a millisecond to raise it after the other table's turn.

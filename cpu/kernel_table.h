@@ -21,6 +21,7 @@ struct NoSlabs;
 
 // What a table, or the part of it that one translation unit makes, is made for.
 using MadeFor = bool (*)(KernelChoice);
+constexpr bool everything(KernelChoice) { return true; }
 constexpr bool first_hits(KernelChoice choice) {
     return choice.query == QueryKind::closest || choice.query == QueryKind::any;
 }
@@ -34,24 +35,27 @@ constexpr bool closest_inexact(KernelChoice choice) {
 
 template <class Isa, template <class> class ForFloat32, template <class> class ForCompressed, MadeFor made_for>
 struct KernelMaker {
+    using Real = typename Isa::Real;
+
     template <QueryKind kind>
-    using Query = std::tuple_element_t<static_cast<std::size_t>(kind), std::tuple<ClosestHit, AnyHit, AllHits, CountHits>>;
+    using Query = std::tuple_element_t<static_cast<std::size_t>(kind), std::tuple<ClosestHit<Real>, AnyHit<Real>, AllHits<Real>, CountHits<Real>>>;
 
     template <template <class> class Slabs, template <class> class Triangles, class Query, bool counting>
     struct Kernel {
-        static constexpr TraceBatch trace =
+        static constexpr TraceBatch<Real> trace =
             trace_batch<Isa, Slabs, Triangles, Query, std::conditional_t<counting, StepCounters, NoCounters>>;
         static constexpr std::size_t flight_bytes = sizeof(Flight<typename Triangles<Isa>::Frame, Query, StepCounters>);
     };
     struct NoKernel {
-        static constexpr TraceBatch trace = nullptr;
+        static constexpr TraceBatch<Real> trace = nullptr;
         static constexpr std::size_t flight_bytes = 0;
     };
 
     template <KernelChoice choice, template <class> class Slabs>
     static constexpr auto kernel_with() {
         using Asked = Query<choice.query>;
-        if constexpr (!made_for(choice) || std::is_same_v<Slabs<Isa>, NoSlabs<Isa>>)
+        constexpr bool exact_of_doubles = choice.accuracy == Accuracy::exact && precision_of<Real> == Precision::float64;
+        if constexpr (!made_for(choice) || exact_of_doubles || std::is_same_v<Slabs<Isa>, NoSlabs<Isa>>)
             return NoKernel{};
         else if constexpr (choice.accuracy == Accuracy::fast)
             return Kernel<Slabs, FastTriangles, Asked, choice.counting>{};
@@ -72,7 +76,7 @@ struct KernelMaker {
     }
 
     template <std::size_t... index>
-    static constexpr KernelTable table(std::string_view name, std::index_sequence<index...>) {
+    static constexpr KernelTable<Real> table(std::string_view name, std::index_sequence<index...>) {
         return {name,
                 std::max({decltype(kernel<kernel_choice(index)>())::flight_bytes...}),
                 {decltype(kernel<kernel_choice(index)>())::trace...}};
@@ -80,7 +84,7 @@ struct KernelMaker {
 };
 
 template <class Isa, template <class> class ForFloat32, template <class> class ForCompressed, MadeFor made_for>
-constexpr KernelTable make_kernel_table(std::string_view name) {
+constexpr KernelTable<typename Isa::Real> make_kernel_table(std::string_view name) {
     return KernelMaker<Isa, ForFloat32, ForCompressed, made_for>::table(name, std::make_index_sequence<kernel_count>());
 }
 

@@ -18,37 +18,41 @@ std::string describe(KernelChoice choice) {
 
 }  // namespace
 
-TraceBatch KernelTable::find(KernelChoice choice) const {
-    const TraceBatch kernel = kernels[kernel_index(choice)];
+template <class Real>
+TraceBatch<Real> KernelTable<Real>::find(KernelChoice choice) const {
+    const TraceBatch<Real> kernel = kernels[kernel_index(choice)];
     if (kernel == nullptr)
         throw std::invalid_argument("kernel '" + std::string(name) + "' was not made for " + describe(choice) +
                                     ": 'avx512', 'avx2' and 'scalar' are made for everything");
     return kernel;
 }
 
-std::optional<KernelTable> join(std::string_view name, std::initializer_list<const KernelTable*> parts) {
-    KernelTable table = {name, 0, {}};
-    for (const KernelTable* part : parts) {
+template struct KernelTable<float>;
+template struct KernelTable<double>;
+
+std::optional<KernelTable<float>> join(std::string_view name, std::initializer_list<const KernelTable<float>*> parts) {
+    KernelTable<float> table = {name, 0, {}};
+    for (const KernelTable<float>* part : parts) {
         if (part == nullptr) continue;
         table.flight_bytes = std::max(table.flight_bytes, part->flight_bytes);
         std::transform(table.kernels.begin(), table.kernels.end(), part->kernels.begin(), table.kernels.begin(),
-                       [](TraceBatch had, TraceBatch more) { return had != nullptr ? had : more; });
+                       [](TraceBatch<float> had, TraceBatch<float> more) { return had != nullptr ? had : more; });
     }
     if (table.flight_bytes == 0) return std::nullopt;
     return table;
 }
 
-const KernelTable* avx512_full_kernels() {
+const KernelTable<float>* avx512_full_kernels() {
     static const auto table = join("avx512.full", {avx512_full_first_hits(), avx512_full_all_hits()});
     return table ? &*table : nullptr;
 }
 
-const KernelTable* avx2_kernels() {
+const KernelTable<float>* avx2_kernels() {
     static const auto table = join("avx2", {avx2_first_hits(), avx2_all_hits()});
     return table ? &*table : nullptr;
 }
 
-const KernelTable* scalar_kernels() {
+const KernelTable<float>* scalar_kernels() {
     static const auto table = join("scalar", {scalar_first_hits(), scalar_all_hits()});
     return table ? &*table : nullptr;
 }

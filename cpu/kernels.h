@@ -36,35 +36,42 @@ constexpr KernelChoice kernel_choice(std::size_t index) {
 
 // One thread's share of a batch: rays come from the source until it is empty. in_flight rays are traced in turns;
 // 1 is plain single-ray traversal. scratch: in_flight * flight_bytes of 64-byte aligned memory where it is above 1.
-using TraceBatch = void (*)(const BvhView&, const RayBatch&, const HitBatch&, const RaySource&, unsigned in_flight,
-                            std::byte* scratch);
+template <class Real>
+using TraceBatch = void (*)(const BvhView&, const RayBatch<Real>&, const HitBatch<Real>&, const RaySource&,
+                            unsigned in_flight, std::byte* scratch);
 
+// The kernels for scenes of one precision.
+template <class Real>
 struct KernelTable {
     std::string_view name;
     std::size_t flight_bytes;  // of the largest kernel
-    std::array<TraceBatch, kernel_count> kernels;  // null: the table was not made for this
+    std::array<TraceBatch<Real>, kernel_count> kernels;  // null: the table was not made for this
 
     // Throws std::invalid_argument, naming the choice, where the table was not made for it.
-    TraceBatch find(KernelChoice choice) const;
+    TraceBatch<Real> find(KernelChoice choice) const;
 };
 
 // One table of all the parts' kernels, each from the first part that has it; none where no part is compiled in (null).
-std::optional<KernelTable> join(std::string_view name, std::initializer_list<const KernelTable*> parts);
+std::optional<KernelTable<float>> join(std::string_view name, std::initializer_list<const KernelTable<float>*> parts);
 
 // Null where this build has no such kernels; whether the machine can run them is dispatch.h's business.
-const KernelTable* avx512_full_kernels();
-const KernelTable* avx512_half_kernels();
-const KernelTable* avx512_by_distance_kernels();
-const KernelTable* avx2_kernels();
-const KernelTable* scalar_kernels();
-const KernelTable* scalar_by_distance_kernels();
+const KernelTable<float>* avx512_full_kernels();
+const KernelTable<float>* avx512_half_kernels();
+const KernelTable<float>* avx512_by_distance_kernels();
+const KernelTable<float>* avx2_kernels();
+const KernelTable<float>* scalar_kernels();
+const KernelTable<float>* scalar_by_distance_kernels();
+
+const KernelTable<double>* avx512_float64_kernels();
+const KernelTable<double>* avx2_float64_kernels();
+const KernelTable<double>* scalar_float64_kernels();
 
 // Parts of these, each from a translation unit of its own: closest and any hit; all hits and their number.
-const KernelTable* avx512_full_first_hits();
-const KernelTable* avx512_full_all_hits();
-const KernelTable* avx2_first_hits();
-const KernelTable* avx2_all_hits();
-const KernelTable* scalar_first_hits();
-const KernelTable* scalar_all_hits();
+const KernelTable<float>* avx512_full_first_hits();
+const KernelTable<float>* avx512_full_all_hits();
+const KernelTable<float>* avx2_first_hits();
+const KernelTable<float>* avx2_all_hits();
+const KernelTable<float>* scalar_first_hits();
+const KernelTable<float>* scalar_all_hits();
 
 }  // namespace wive

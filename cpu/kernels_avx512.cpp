@@ -7,11 +7,11 @@
 #include "slabs.h"
 
 namespace wive {
-static constexpr KernelTable table = make_kernel_table<Avx512, FullSlabs, CompressedSlabs, first_hits>("avx512.full");
-const KernelTable* avx512_full_first_hits() { return &table; }
+static constexpr KernelTable<float> table = make_kernel_table<Avx512, FullSlabs, CompressedSlabs, first_hits>("avx512.full");
+const KernelTable<float>* avx512_full_first_hits() { return &table; }
 }  // namespace wive
 #else
 namespace wive {
-const KernelTable* avx512_full_first_hits() { return nullptr; }
+const KernelTable<float>* avx512_full_first_hits() { return nullptr; }
 }  // namespace wive
 #endif

@@ -6,12 +6,12 @@
 #include "slabs.h"
 
 namespace wive {
-static constexpr KernelTable table =
+static constexpr KernelTable<float> table =
     make_kernel_table<Avx512ByDistance, FullSlabs, NoSlabs, closest_inexact>("avx512.distance");
-const KernelTable* avx512_by_distance_kernels() { return &table; }
+const KernelTable<float>* avx512_by_distance_kernels() { return &table; }
 }  // namespace wive
 #else
 namespace wive {
-const KernelTable* avx512_by_distance_kernels() { return nullptr; }
+const KernelTable<float>* avx512_by_distance_kernels() { return nullptr; }
 }  // namespace wive
 #endif

@@ -6,11 +6,11 @@
 #include "simd_avx512.h"
 
 namespace wive {
-static constexpr KernelTable table = make_kernel_table<Avx512, HalfSlabs, NoSlabs, all_but_counting>("avx512.half");
-const KernelTable* avx512_half_kernels() { return &table; }
+static constexpr KernelTable<float> table = make_kernel_table<Avx512, HalfSlabs, NoSlabs, all_but_counting>("avx512.half");
+const KernelTable<float>* avx512_half_kernels() { return &table; }
 }  // namespace wive
 #else
 namespace wive {
-const KernelTable* avx512_half_kernels() { return nullptr; }
+const KernelTable<float>* avx512_half_kernels() { return nullptr; }
 }  // namespace wive
 #endif

@@ -4,9 +4,9 @@
 #include "slabs.h"
 
 namespace wive {
-static constexpr KernelTable stored = make_kernel_table<Scalar, FullSlabs, CompressedSlabs, first_hits>("scalar");
-static constexpr KernelTable by_distance =
+static constexpr KernelTable<float> stored = make_kernel_table<Scalar, FullSlabs, CompressedSlabs, first_hits>("scalar");
+static constexpr KernelTable<float> by_distance =
     make_kernel_table<ScalarByDistance, FullSlabs, NoSlabs, closest_inexact>("scalar.distance");
-const KernelTable* scalar_first_hits() { return &stored; }
-const KernelTable* scalar_by_distance_kernels() { return &by_distance; }
+const KernelTable<float>* scalar_first_hits() { return &stored; }
+const KernelTable<float>* scalar_by_distance_kernels() { return &by_distance; }
 }  // namespace wive

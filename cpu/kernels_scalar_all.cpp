@@ -4,6 +4,6 @@
 #include "slabs.h"
 
 namespace wive {
-static constexpr KernelTable table = make_kernel_table<Scalar, FullSlabs, CompressedSlabs, all_hits>("scalar");
-const KernelTable* scalar_all_hits() { return &table; }
+static constexpr KernelTable<float> table = make_kernel_table<Scalar, FullSlabs, CompressedSlabs, all_hits>("scalar");
+const KernelTable<float>* scalar_all_hits() { return &table; }
 }  // namespace wive

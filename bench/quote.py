@@ -1,0 +1,261 @@
+"""Writes the tables of docs/benchmarks.md from the files in bench/results.
+
+A table stands between `<!-- quote: NAME -->` and `<!-- end -->`; what is there is replaced. Tables whose
+results are missing stay as they are.
+"""
+
+import argparse
+import json
+import re
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+
+from bench import report
+from bench.timing import geometric_mean
+
+DOCUMENT = report.REPOSITORY / "docs" / "benchmarks.md"
+QUOTE = re.compile(r"(<!-- quote: ([\w.]+) -->\n).*?(<!-- end -->)", re.DOTALL)
+ACCURACIES = ("fast", "watertight")
+
+Table = Callable[[report.Row], str]
+
+
+def main(options: Sequence[str]) -> None:
+    """Rewrites the document, and says what it lacks."""
+    parser = argparse.ArgumentParser(prog="python -m bench quote", description=__doc__)
+    parser.add_argument("--document", type=Path, default=DOCUMENT)
+    parser.add_argument("--results", type=Path, default=report.RESULTS, help="the folder of JSON files")
+    chosen = parser.parse_args(options)
+    text = chosen.document.read_text()
+    chosen.document.write_text(quoted(text, chosen.results))
+    for name in sorted({match[2] for match in QUOTE.finditer(text)}):
+        bench = name.split(".")[0]
+        if not (chosen.results / f"{bench}.json").exists():
+            print(f"{name}: no results yet, run `python -m bench {bench}`")
+
+
+def quoted(text: str, results: Path) -> str:
+    """The text with its tables as the results have them."""
+
+    def fresh(match: re.Match[str]) -> str:
+        path = results / f"{match[2].split('.')[0]}.json"
+        if not path.exists():
+            return match[0]
+        return f"{match[1]}\n{TABLES[match[2]](json.loads(path.read_text()))}\n{match[3]}"
+
+    return QUOTE.sub(fresh, text)
+
+
+def markdown(columns: Sequence[str], rows: Iterable[Sequence[object]], texts: int = 1) -> str:
+    """A table; the first `texts` columns to the left, the others to the right."""
+    lines = [columns, ["---"] * texts + ["---:"] * (len(columns) - texts), *rows]
+    return "".join("| " + " | ".join(map(str, line)) + " |\n" for line in lines)
+
+
+def distinct(rows: Sequence[report.Row], *keys: str) -> list[tuple[object, ...]]:
+    """The combinations of these columns, in order of appearance."""
+    return list(dict.fromkeys(tuple(row[key] for key in keys) for row in rows))
+
+
+def where(rows: Sequence[report.Row], **wanted: object) -> list[report.Row]:
+    """The rows with these values."""
+    return [row for row in rows if all(row[key] == value for key, value in wanted.items())]
+
+
+def pivot(
+    rows: Sequence[report.Row], value: str, heads: Sequence[tuple[str, report.Row]], form: str = "{:.2f}"
+) -> str:
+    """A line a scene, a column for each of the (title, wanted values), and below them means and lowest."""
+    columns = [where(rows, **wanted) for _, wanted in heads]
+    lines: list[list[object]] = []
+    for scene, triangles in distinct(rows, "scene", "triangles"):
+        cells = [[form.format(row[value]) for row in where(column, scene=scene)] for column in columns]
+        lines.append([scene, f"{triangles:,}", *(cell[0] if cell else "" for cell in cells)])
+    values = [[float(row[value]) for row in column] for column in columns]
+    lines.append(["**geometric mean**", "", *(f"**{geometric_mean(column):.2f}**" for column in values)])
+    lines.append(["**lowest**", "", *(form.format(min(column)) for column in values)])
+    return markdown(["scene", "triangles", *(title for title, _ in heads)], lines)
+
+
+def embree_speed(kernel: str, in_flight: object) -> Table:
+    """Speed against Embree: accuracies by kinds of rays."""
+
+    def table(content: report.Row) -> str:
+        rows = where(content["speed"], kernel=kernel, in_flight=in_flight, nodes="float32")
+        heads = [
+            (f"{accuracy}<br>{kind}", {"accuracy": accuracy, "rays": kind})
+            for accuracy in ACCURACIES
+            for (kind,) in distinct(rows, "rays")
+        ]
+        return pivot(rows, "ratio", heads)
+
+    return table
+
+
+def embree_compressed(content: report.Row) -> str:
+    """Compressed nodes: their ratio to Embree over that of float32 nodes."""
+    rows = where(content["speed"], kernel="avx512", accuracy="watertight")
+    keys = ("scene", "in_flight", "rays")
+    plain = {tuple(row[key] for key in keys): row["ratio"] for row in where(rows, nodes="float32")}
+    relative = [
+        {**row, "relative": row["ratio"] / plain[tuple(row[key] for key in keys)]}
+        for row in where(rows, nodes="compressed")
+    ]
+    heads = [
+        (f"{'one ray' if flight == 1 else 'in flight'}<br>{kind}", {"in_flight": flight, "rays": kind})
+        for (flight,) in sorted(distinct(relative, "in_flight"), key=lambda key: key == (1,))
+        for (kind,) in distinct(relative, "rays")
+    ]
+    return pivot(relative, "relative", heads)
+
+
+def embree_build(content: report.Row) -> str:
+    """Build time, SAH and bytes a triangle."""
+    lines = []
+    for tree in content["trees"]:
+        times = {row["threads"]: row for row in where(content["build"], scene=tree["scene"])}
+        many = times[max(times)]
+        lines.append(
+            [
+                tree["scene"],
+                f"{tree['triangles']:,}",
+                *(f"{times[threads]['ratio']:.2f}" for threads in sorted(times)),
+                f"{many['wive_seconds']:.3f}",
+                f"{tree['wive_sah']:.2f} / {tree['embree_sah']:.2f}",
+                f"{tree['wive_bytes']:.1f} / {tree['embree_bytes']:.1f}",
+            ]
+        )
+    threads = sorted({row["threads"] for row in content["build"]})
+    heads = [f"build, {number} thread{'s' * (number > 1)}" for number in threads]
+    seconds = f"seconds, {threads[-1]} threads"
+    sides = ["SAH cost, wive / Embree", "bytes a triangle, wive / Embree"]
+    return markdown(["scene", "triangles", *heads, seconds, *sides], lines)
+
+
+def build_growth(content: report.Row) -> str:
+    """How the cost of building grows with the mesh."""
+    lines = []
+    trees = {(row["scene"], row["quality"]): row for row in content["trees"]}
+    for scene, quality in distinct(content["build"], "scene", "quality"):
+        rows = where(content["build"], scene=scene, quality=quality)
+        tree = trees[scene, quality]
+        lines.append(
+            [
+                scene,
+                quality,
+                f"{tree['triangles']:,}",
+                "<br>".join(f"{row['wive_ns_per_triangle']:.0f}" for row in rows),
+                "<br>".join(f"{row['embree_ns_per_triangle']:.0f}" for row in rows),
+                "<br>".join(f"{row['ratio']:.2f}" for row in rows),
+                f"{tree['sah_ratio']:.3f}",
+                f"{tree['wive_bytes']:.1f} / {tree['embree_bytes']:.1f}",
+            ]
+        )
+    heads = ["ns a triangle, wive", "Embree", "ratio", "SAH ratio", "bytes a triangle"]
+    return markdown(["mesh", "quality", "triangles", *heads], lines, 2)
+
+
+def paper_gains(content: report.Row) -> str:
+    """Gain in percent of each kernel, one ray at a time and in flight."""
+    heads = [
+        (f"{kernel}<br>{accuracy}<br>{'one ray' if flight == 1 else 'in flight'}", (kernel, accuracy, flight))
+        for accuracy, kernel, flight in distinct(content["rows"], "accuracy", "kernel", "in_flight")
+    ]
+    lines: list[list[object]] = []
+    for (scene,) in distinct(content["rows"], "scene"):
+        rows = where(content["rows"], scene=scene)
+        gains = {(row["kernel"], row["accuracy"], row["in_flight"]): row["gain"] for row in rows}
+        lines.append([scene, *(f"{gains[key]:+.0f} %" for _, key in heads)])
+    means = {(row["kernel"], row["accuracy"], row["in_flight"]): row for row in content["means"]}
+    lines.append(["**mean**", *(f"**{means[key]['mean_gain']:+.0f} %**" for _, key in heads)])
+    return markdown(["scene", *(title for title, _ in heads)], lines)
+
+
+def python_means(content: report.Row) -> str:
+    """How much faster a Python user is, per rival and number of threads."""
+    lines = [
+        [
+            *(row[key] for key in ("query", "other", "ours", "threads")),
+            f"{row['mean']:.1f}",
+            f"{row['lowest']:.1f} ({row['lowest_at']})",
+        ]
+        for row in content["means"]
+    ]
+    return markdown(["query", "other", "ours", "threads", "geometric mean", "lowest"], lines, 3)
+
+
+def python_single(content: report.Row) -> str:
+    """Microseconds of a call for one ray, the median over scenes."""
+    lines = []
+    for query, caller in distinct(content["single"], "query", "caller"):
+        times = sorted(row["p50_us"] for row in where(content["single"], query=query, caller=caller))
+        lines.append([query, caller, f"{times[len(times) // 2]:.1f}"])
+    return markdown(["query", "caller", "microseconds a call"], lines, 2)
+
+
+def inflight_best(content: report.Row) -> str:
+    """The best number of rays in flight, and the default's speed."""
+    lines = [
+        [
+            *(row["scene"], row["rays"], f"{row['triangles']:,}", f"{row['tree_mib']:.1f}", row["best"]),
+            *(f"{row['speedup']:.2f}", f"{row['tuned']:.2f}", f"{row['mrays']:.1f}"),
+            f"{row['latency_ns']:.0f}",
+        ]
+        for row in content["best"]
+    ]
+    heads = ["triangles", "tree, MiB", "best K", "speed over K = 1", "default's", "Mray/s", "latency, ns"]
+    return markdown(["scene", "rays", *heads], lines, 2)
+
+
+def order_means(content: report.Row) -> str:
+    """Steps and speed of each order, geometric means over scenes."""
+    speeds = {(row["rays"], row["order"], row["in_flight"]): row["speed"] for row in content["speed_means"]}
+    lines = [
+        [row["rays"], row["order"], f"{row['nodes_vs_distance']:.3f}", f"{row['triangles_vs_distance']:.3f}"]
+        + [f"{speeds[(row['rays'], row['order'], flight)]:.2f}" for flight in (1, "tuned")]
+        for row in content["means"]
+    ]
+    heads = ["inner nodes", "triangles", "speed, one ray", "speed, in flight"]
+    return markdown(["rays", "order", *heads], lines, 2)
+
+
+def order_scenes(content: report.Row) -> str:
+    """Inner nodes, leaves and triangles a ray, per scene and order."""
+    orders = [order for (order,) in distinct(content["rows"], "order")]
+    lines: list[list[object]] = []
+    for scene, kind in distinct(content["rows"], "scene", "rays"):
+        rows = {row["order"]: row for row in where(content["rows"], scene=scene, rays=kind)}
+        steps = ("inner_nodes", "leaves", "triangles")
+        cells = [" ".join(f"{rows[order][step]:.2f}" for step in steps) for order in orders]
+        lines.append([scene, kind, *cells])
+    return markdown(["scene", "rays", *map(str, orders)], lines, 2)
+
+
+def pareto_means(content: report.Row) -> str:
+    """Speed and errors of each contender."""
+    lines = [
+        [row["contender"], f"{row['mrays']:.2f}", f"{row['single']:.2f}" if row["single"] else ""]
+        + [f"{1e6 * row[key]:.1f}" for key in ("leaks", "wrong")]
+        + [f"{row[key]:.3g}" for key in ("t_median", "t_worst")]
+        for row in content["means"]
+    ]
+    heads = ["Mray/s", "one ray", "leaks, ppm", "wrong triangle, ppm", "t, median ulp", "t, worst ulp"]
+    return markdown(["contender", *heads], lines)
+
+
+TABLES: dict[str, Table] = {
+    "embree.avx512_in_flight": embree_speed("avx512", "tuned"),
+    "embree.avx512_one_ray": embree_speed("avx512", 1),
+    "embree.avx2_in_flight": embree_speed("avx2", "tuned"),
+    "embree.avx2_one_ray": embree_speed("avx2", 1),
+    "embree.compressed": embree_compressed,
+    "embree.build": embree_build,
+    "build.growth": build_growth,
+    "paper.gains": paper_gains,
+    "python.means": python_means,
+    "python.single": python_single,
+    "inflight.best": inflight_best,
+    "order.means": order_means,
+    "order.scenes": order_scenes,
+    "pareto.means": pareto_means,
+}
