@@ -49,7 +49,7 @@ public:
         const Treelet root = gather_root(tree_);
         std::vector<Part> subtrees;
         Size top = {1, 0};
-        plan_top(root, top, subtrees);
+        plan_top(root, 1, top, subtrees);
         parallel_for(subtrees.size(), threads, [&](std::size_t i) { subtrees[i].size = size_of(subtrees[i].slot); });
         Size total = top;
         for (Part& subtree : subtrees) {
@@ -64,25 +64,30 @@ public:
         nodes_ = reinterpret_cast<StoredNode*>(units.data());
         leaves_ = units.data() + node_bytes;
         first_leaf_unit_ = node_bytes / unit_bytes;
-        Size cursor = {1, 0};
-        std::size_t next_subtree = 0;
-        int depth = emit_top(root, 0, cursor, subtrees, next_subtree);
-        std::vector<int> depths(subtrees.size());
-        parallel_for(subtrees.size(), threads, [&](std::size_t i) {
-            Size at = subtrees[i].first;
-            if (!subtrees[i].slot.leaf) depths[i] = emit_subtree(subtrees[i].slot, subtrees[i].node, at);
+        const std::size_t count = subtrees.size() + 1;  // and the top
+        parallel_for(count, threads, [&](std::size_t i) {
+            const std::size_t k = far_apart(i, count);
+            if (k == subtrees.size()) {
+                std::size_t next_node = 1;
+                const Part* next_subtree = subtrees.data();
+                emit_top(root, 0, next_node, next_subtree);
+            } else if (Part& subtree = subtrees[k]; !subtree.slot.leaf) {
+                Size at = subtree.first;
+                subtree.depth += emit_subtree(subtree.slot, subtree.node, at);
+            }
         });
-        for (std::size_t i = 0; i < subtrees.size(); ++i) depth = std::max(depth, subtrees[i].depth + depths[i]);
+        int depth = 1;
+        for (const Part& subtree : subtrees) depth = std::max(depth, subtree.depth);
         return {std::move(units), total.nodes, depth};
     }
 
 private:
-    // A slot whose whole content one thread emits; its own node's place was given by its parent.
+    // A slot whose whole content one thread emits, but for its own node's lane in the node above.
     struct Part {
         Slot slot;
-        Size size, first;
-        std::size_t node = 0;
-        int depth = 0;
+        std::size_t node;  // where its own goes
+        int depth;         // of the node above, the root's being 1; in the end of the deepest below
+        Size size = {}, first = {};
     };
     using Children = std::array<std::uint32_t, node_width>;
 
@@ -90,14 +95,21 @@ private:
 
     bool is_top(const Slot& slot) const { return !slot.leaf && slot.tree.size() > subtree_size_; }
 
-    void plan_top(const Treelet& treelet, Size& top, std::vector<Part>& subtrees) const {
-        for (int i = 0; i < treelet.count; ++i) top.nodes += treelet.slots[static_cast<std::size_t>(i)].leaf ? 0 : 1;
+    static std::size_t inner_count(const Treelet& treelet) {
+        return static_cast<std::size_t>(std::count_if(treelet.slots.begin(), treelet.slots.begin() + treelet.count,
+                                                      [](const Slot& slot) { return !slot.leaf; }));
+    }
+
+    void plan_top(const Treelet& treelet, int depth, Size& top, std::vector<Part>& subtrees) const {
+        std::size_t child_node = top.nodes;
+        top.nodes += inner_count(treelet);
         for (int i = 0; i < treelet.count; ++i) {
             const Slot& slot = treelet.slots[static_cast<std::size_t>(i)];
+            const std::size_t node = slot.leaf ? 0 : child_node++;
             if (is_top(slot))
-                plan_top(gather_treelet(tree_, slot.tree), top, subtrees);
+                plan_top(gather_treelet(tree_, slot.tree), depth + 1, top, subtrees);
             else
-                subtrees.push_back({slot, {}, {}, 0, 0});
+                subtrees.push_back({slot, node, depth});
         }
     }
 
@@ -110,30 +122,23 @@ private:
         });
     }
 
-    int emit_top(const Treelet& treelet, std::size_t place, Size& cursor, std::vector<Part>& subtrees,
-                 std::size_t& next_subtree) {
-        std::size_t child_node = cursor.nodes;
-        for (int i = 0; i < treelet.count; ++i) cursor.nodes += treelet.slots[static_cast<std::size_t>(i)].leaf ? 0 : 1;
+    void emit_top(const Treelet& treelet, std::size_t place, std::size_t& next_node, const Part*& next_subtree) {
+        std::size_t child_node = next_node;
+        next_node += inner_count(treelet);
         Children children{};
-        int deepest = 0;
         for (int i = 0; i < treelet.count; ++i) {
             const Slot& slot = treelet.slots[static_cast<std::size_t>(i)];
+            std::uint32_t& child = children[static_cast<std::size_t>(i)];
             const std::size_t node = slot.leaf ? 0 : child_node++;
+            child = node_child(node);
             if (is_top(slot)) {
-                children[static_cast<std::size_t>(i)] = node_child(node);
-                const std::size_t first = next_subtree;
-                deepest = std::max(deepest, emit_top(gather_treelet(tree_, slot.tree), node, cursor, subtrees, next_subtree));
-                for (std::size_t k = first; k < next_subtree; ++k) ++subtrees[k].depth;
+                emit_top(gather_treelet(tree_, slot.tree), node, next_node, next_subtree);
             } else {
-                Part& subtree = subtrees[next_subtree++];
-                subtree.node = node;
-                subtree.depth = 1;
-                Size at = subtree.first;
-                children[static_cast<std::size_t>(i)] = slot.leaf ? write_leaf(slot, at) : node_child(node);
+                Size at = next_subtree++->first;
+                if (slot.leaf) child = write_leaf(slot, at);
             }
         }
         write_node(nodes_[place], treelet, children);
-        return deepest + 1;
     }
 
     // Returns the depth of the subtree, its root counted.

@@ -125,7 +125,7 @@ PrimRefs make_prim_refs(const Mesh& mesh, Threads& threads) {
         Box box, centroids;
     };
     std::vector<Part> parts(chunks);
-    parallel_chunks(mesh.face_count, chunk_size, threads, [&](std::size_t begin, std::size_t end) {
+    parallel_chunks_apart(mesh.face_count, chunk_size, threads, [&](std::size_t begin, std::size_t end) {
         PrimRef* to = all.refs.data() + begin;
         Part part;
         for (std::size_t face = begin; face < end; ++face) {
