@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "any_hit_order.h"
 #include "collapse.h"
 #include "parallel.h"
 #include "write_compressed.h"
@@ -45,8 +46,10 @@ public:
     using Size = TreeSize;
 
     EmittedTree emit(Threads& threads) {
+        coverage_ = Coverage(tree_, threads);
         // First the top of the tree, which only plans; then each subtree below it, at a place known by its size.
-        const Treelet root = gather_root(tree_);
+        Treelet root = gather_root(tree_);
+        stand_for_any_hit(tree_, coverage_, root);
         std::vector<Part> subtrees;
         Size top = {1, 0};
         plan_top(root, 1, top, subtrees);
@@ -95,6 +98,12 @@ private:
 
     bool is_top(const Slot& slot) const { return !slot.leaf && slot.tree.size() > subtree_size_; }
 
+    Treelet treelet_of(const Slot& slot) const {
+        Treelet treelet = gather_treelet(tree_, slot.tree);
+        stand_for_any_hit(tree_, coverage_, treelet);
+        return treelet;
+    }
+
     static std::size_t inner_count(const Treelet& treelet) {
         return static_cast<std::size_t>(std::count_if(treelet.slots.begin(), treelet.slots.begin() + treelet.count,
                                                       [](const Slot& slot) { return !slot.leaf; }));
@@ -107,7 +116,7 @@ private:
             const Slot& slot = treelet.slots[static_cast<std::size_t>(i)];
             const std::size_t node = slot.leaf ? 0 : child_node++;
             if (is_top(slot))
-                plan_top(gather_treelet(tree_, slot.tree), depth + 1, top, subtrees);
+                plan_top(treelet_of(slot), depth + 1, top, subtrees);
             else
                 subtrees.push_back({slot, node, depth});
         }
@@ -132,7 +141,7 @@ private:
             const std::size_t node = slot.leaf ? 0 : child_node++;
             child = node_child(node);
             if (is_top(slot)) {
-                emit_top(gather_treelet(tree_, slot.tree), node, next_node, next_subtree);
+                emit_top(treelet_of(slot), node, next_node, next_subtree);
             } else {
                 Size at = next_subtree++->first;
                 if (slot.leaf) child = write_leaf(slot, at);
@@ -143,7 +152,7 @@ private:
 
     // Returns the depth of the subtree, its root counted.
     int emit_subtree(const Slot& slot, std::size_t place, Size& cursor) {
-        const Treelet treelet = gather_treelet(tree_, slot.tree);
+        const Treelet treelet = treelet_of(slot);
         Children children{};
         std::size_t child_node = cursor.nodes;
         for (int i = 0; i < treelet.count; ++i) {
@@ -159,17 +168,10 @@ private:
         return deepest + 1;
     }
 
-    Box box_of(const Slot& slot) const {
-        if (slot.tree.has_node()) return tree_.box_of(slot.tree);
-        Box box;
-        for (std::uint32_t i = slot.tree.begin; i < slot.tree.end; ++i) box.grow(tree_.refs[i].box());
-        return box;
-    }
-
     void write_node(StoredNode& out, const Treelet& treelet, const Children& children) const {
         Node node;
         for (int i = 0; i < node_width; ++i) {
-            write_box(node, i, i < treelet.count ? box_of(treelet.slots[static_cast<std::size_t>(i)]) : Box{}, center_);
+            write_box(node, i, i < treelet.count ? tree_.box_of(treelet.slots[static_cast<std::size_t>(i)].tree) : Box{}, center_);
             node.child[i] = children[static_cast<std::size_t>(i)];
         }
         const SlotSequences order = options_.order == ChildOrder::treelet    ? treelet.order
@@ -194,6 +196,7 @@ private:
     const BuildOptions& options_;
     const std::array<float, 3>& center_;
     std::uint32_t subtree_size_ = std::clamp(tree_.count / subtree_count, smallest_subtree, largest_subtree);
+    Coverage coverage_;
     StoredNode* nodes_ = nullptr;
     std::byte* leaves_ = nullptr;
     std::size_t first_leaf_unit_ = 0;

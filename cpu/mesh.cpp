@@ -44,16 +44,22 @@ bool has_area(const float* a, const float* b, const float* c) {
     return false;
 }
 
+Float4v yzx(Float4v x) { return __builtin_shufflevector(x, x, 1, 2, 0, 3); }
+Float4v magnitude(Float4v x) { return maximum(x, Float4v{} - x); }
+
+float projected_area(Float4v a, Float4v b, Float4v c) {
+    const Float4v u = b - a, v = c - a, areas = magnitude(u * yzx(v) - yzx(u) * v);
+    return areas[0] + areas[1] + areas[2];
+}
+
 // Settles it for most: some component of the cross product is larger than its rounding error. Differences and products
 // are off by a unit roundoff u each, sums of two by another: 4u of both products' sizes, taken twice as large, and what
 // underflow may add.
 bool surely_has_area(Float4v a, Float4v b, Float4v c) {
     constexpr float error = 4 * std::numeric_limits<float>::epsilon(), underflow = 4 * std::numeric_limits<float>::min();
     const Float4v u = b - a, v = c - a;
-    const auto yzx = [](Float4v x) { return __builtin_shufflevector(x, x, 1, 2, 0, 3); };
     const Float4v left = u * yzx(v), right = yzx(u) * v;
-    const Float4v cross = left - right, zero = {};
-    const auto magnitude = [&](Float4v x) { return maximum(x, zero - x); };
+    const Float4v cross = left - right;
     const Int4v sure = magnitude(cross) > error * (magnitude(left) + magnitude(right)) + underflow;
     return (sure[0] | sure[1] | sure[2]) != 0;
 }
@@ -113,6 +119,7 @@ bool box_triangle(const Mesh& mesh, std::size_t face, Box& box) {
     const Float4v a = load_vertex(mesh, corners[0]), b = load_vertex(mesh, corners[1]),
                   c = load_vertex(mesh, corners[2]);
     box = {minimum(minimum(a, b), c), maximum(maximum(a, b), c)};
+    box.hi[3] = projected_area(a, b, c);
     return surely_has_area(a, b, c) || has_area(mesh.corner(face, 0), mesh.corner(face, 1), mesh.corner(face, 2));
 }
 

@@ -22,11 +22,14 @@ struct Mesh {
     }
 };
 
-// A triangle's box and number, 32 bytes: the number rides in the low corner's fourth lane.
+// A triangle's box, number and size, 32 bytes: the number rides in the low corner's fourth lane, the projected area in the
+// high one's.
 struct PrimRef {
     Float4v lo, hi;
 
     std::uint32_t prim() const { return std::bit_cast<std::uint32_t>(static_cast<float>(lo[3])); }
+    // Twice the sum of the triangle's projections onto the three planes between axes.
+    float projected_area() const { return hi[3]; }
     Box box() const { return {lo, hi}; }
     // Twice the box's centre. The number's bits are cleared first: as a float they would be a slow denormal.
     Float4v centroid() const {
@@ -39,7 +42,7 @@ struct PrimRef {
 // points outside the vertices.
 void check_mesh(const Mesh& mesh, Threads& threads);
 
-// The box of a triangle; false where it has no area, decided exactly.
+// The box of a triangle, its projected area in the high corner's fourth lane; false where it has no area, decided exactly.
 bool box_triangle(const Mesh& mesh, std::size_t face, Box& box);
 
 struct PrimRefs {
