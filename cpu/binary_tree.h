@@ -69,8 +69,12 @@ struct BinaryTree {
 
     Subtree root() const { return {0, count, 0}; }
     BinaryNode node(const Subtree& tree) const { return std::bit_cast<BinaryNode>(nodes[tree.place]); }
-    // The box of a subtree that has a node.
-    Box box_of(const Subtree& tree) const { return nodes[tree.place].box(); }
+    Box box_of(const Subtree& tree) const {
+        if (tree.has_node()) return nodes[tree.place].box();
+        Box box;
+        for (std::uint32_t i = tree.begin; i < tree.end; ++i) box.grow(refs[i].box());
+        return box;
+    }
 };
 
 // Binned SAH, leaf cost counted in blocks of four. The same tree whatever the number of threads. At most depth_limit

@@ -64,14 +64,27 @@ struct Bins {
             for (std::int32_t& n : count[i]) n = 0;
         }
     }
-    void add(const PrimRef* begin, const PrimRef* end, const BinMap& bin_of) {
-        for (const PrimRef* ref = begin; ref < end; ++ref) {
-            const Int4v bin = bin_of(ref->centroid());
-            for (int axis = 0; axis < 3; ++axis) {
-                box[bin[axis]][axis].grow(ref->box());
-                ++count[bin[axis]][axis];
-            }
+    void add(const PrimRef& ref, const BinMap& bin_of) {
+        const Int4v bin = bin_of(ref.centroid());
+        for (int axis = 0; axis < 3; ++axis) {
+            box[bin[axis]][axis].grow(ref.box());
+            ++count[bin[axis]][axis];
         }
+    }
+    void add(const PrimRef* begin, const PrimRef* end, const BinMap& bin_of) {
+        constexpr std::ptrdiff_t many = 256;
+        if (end - begin >= many) {
+            // Neighbours mostly fall into the same bin and would wait for each other's stores: both halves in turn.
+            Bins other(bin_of.count);
+            const PrimRef* const middle = begin + (end - begin) / 2;
+            for (const PrimRef *a = begin, *b = middle; a < middle; ++a, ++b) {
+                add(*a, bin_of);
+                other.add(*b, bin_of);
+            }
+            begin = middle + (middle - begin);
+            add(other, bin_of.count);
+        }
+        for (const PrimRef* ref = begin; ref < end; ++ref) add(*ref, bin_of);
     }
     void add(const Bins& other, int bins) {
         for (int i = 0; i < bins; ++i)

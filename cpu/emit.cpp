@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "any_hit_order.h"
 #include "collapse.h"
 #include "parallel.h"
 #include "write_compressed.h"
@@ -46,11 +47,13 @@ public:
     using Size = TreeSize;
 
     EmittedTree emit(Threads& threads) {
+        coverage_ = Coverage(tree_, threads);
         // First the top of the tree, which only plans; then each subtree below it, at a place known by its size.
-        const Treelet root = gather_root(tree_);
+        Treelet root = gather_root(tree_);
+        stand_for_any_hit(tree_, coverage_, root);
         std::vector<Part> subtrees;
         Size top = {1, 0};
-        plan_top(root, top, subtrees);
+        plan_top(root, 1, top, subtrees);
         parallel_for(subtrees.size(), threads, [&](std::size_t i) { subtrees[i].size = size_of(subtrees[i].slot); });
         Size total = top;
         for (Part& subtree : subtrees) {
@@ -65,25 +68,30 @@ public:
         nodes_ = reinterpret_cast<StoredNode*>(units.data());
         leaves_ = units.data() + node_bytes;
         first_leaf_unit_ = node_bytes / unit_bytes;
-        Size cursor = {1, 0};
-        std::size_t next_subtree = 0;
-        int depth = emit_top(root, 0, cursor, subtrees, next_subtree);
-        std::vector<int> depths(subtrees.size());
-        parallel_for(subtrees.size(), threads, [&](std::size_t i) {
-            Size at = subtrees[i].first;
-            if (!subtrees[i].slot.leaf) depths[i] = emit_subtree(subtrees[i].slot, subtrees[i].node, at);
+        const std::size_t count = subtrees.size() + 1;  // and the top
+        parallel_for(count, threads, [&](std::size_t i) {
+            const std::size_t k = far_apart(i, count);
+            if (k == subtrees.size()) {
+                std::size_t next_node = 1;
+                const Part* next_subtree = subtrees.data();
+                emit_top(root, 0, next_node, next_subtree);
+            } else if (Part& subtree = subtrees[k]; !subtree.slot.leaf) {
+                Size at = subtree.first;
+                subtree.depth += emit_subtree(subtree.slot, subtree.node, at);
+            }
         });
-        for (std::size_t i = 0; i < subtrees.size(); ++i) depth = std::max(depth, subtrees[i].depth + depths[i]);
+        int depth = 1;
+        for (const Part& subtree : subtrees) depth = std::max(depth, subtree.depth);
         return {std::move(units), total.nodes, depth};
     }
 
 private:
-    // A slot whose whole content one thread emits; its own node's place was given by its parent.
+    // A slot whose whole content one thread emits, but for its own node's lane in the node above.
     struct Part {
         Slot slot;
-        Size size, first;
-        std::size_t node = 0;
-        int depth = 0;
+        std::size_t node;  // where its own goes
+        int depth;         // of the node above, the root's being 1; in the end of the deepest below
+        Size size = {}, first = {};
     };
     using Children = std::array<std::uint32_t, node_width>;
 
@@ -91,14 +99,27 @@ private:
 
     bool is_top(const Slot& slot) const { return !slot.leaf && slot.tree.size() > subtree_size_; }
 
-    void plan_top(const Treelet& treelet, Size& top, std::vector<Part>& subtrees) const {
-        for (int i = 0; i < treelet.count; ++i) top.nodes += treelet.slots[static_cast<std::size_t>(i)].leaf ? 0 : 1;
+    Treelet treelet_of(const Slot& slot) const {
+        Treelet treelet = gather_treelet(tree_, slot.tree);
+        stand_for_any_hit(tree_, coverage_, treelet);
+        return treelet;
+    }
+
+    static std::size_t inner_count(const Treelet& treelet) {
+        return static_cast<std::size_t>(std::count_if(treelet.slots.begin(), treelet.slots.begin() + treelet.count,
+                                                      [](const Slot& slot) { return !slot.leaf; }));
+    }
+
+    void plan_top(const Treelet& treelet, int depth, Size& top, std::vector<Part>& subtrees) const {
+        std::size_t child_node = top.nodes;
+        top.nodes += inner_count(treelet);
         for (int i = 0; i < treelet.count; ++i) {
             const Slot& slot = treelet.slots[static_cast<std::size_t>(i)];
+            const std::size_t node = slot.leaf ? 0 : child_node++;
             if (is_top(slot))
-                plan_top(gather_treelet(tree_, slot.tree), top, subtrees);
+                plan_top(treelet_of(slot), depth + 1, top, subtrees);
             else
-                subtrees.push_back({slot, {}, {}, 0, 0});
+                subtrees.push_back({slot, node, depth});
         }
     }
 
@@ -111,35 +132,28 @@ private:
         });
     }
 
-    int emit_top(const Treelet& treelet, std::size_t place, Size& cursor, std::vector<Part>& subtrees,
-                 std::size_t& next_subtree) {
-        std::size_t child_node = cursor.nodes;
-        for (int i = 0; i < treelet.count; ++i) cursor.nodes += treelet.slots[static_cast<std::size_t>(i)].leaf ? 0 : 1;
+    void emit_top(const Treelet& treelet, std::size_t place, std::size_t& next_node, const Part*& next_subtree) {
+        std::size_t child_node = next_node;
+        next_node += inner_count(treelet);
         Children children{};
-        int deepest = 0;
         for (int i = 0; i < treelet.count; ++i) {
             const Slot& slot = treelet.slots[static_cast<std::size_t>(i)];
+            std::uint32_t& child = children[static_cast<std::size_t>(i)];
             const std::size_t node = slot.leaf ? 0 : child_node++;
+            child = node_child(node);
             if (is_top(slot)) {
-                children[static_cast<std::size_t>(i)] = node_child(node);
-                const std::size_t first = next_subtree;
-                deepest = std::max(deepest, emit_top(gather_treelet(tree_, slot.tree), node, cursor, subtrees, next_subtree));
-                for (std::size_t k = first; k < next_subtree; ++k) ++subtrees[k].depth;
+                emit_top(treelet_of(slot), node, next_node, next_subtree);
             } else {
-                Part& subtree = subtrees[next_subtree++];
-                subtree.node = node;
-                subtree.depth = 1;
-                Size at = subtree.first;
-                children[static_cast<std::size_t>(i)] = slot.leaf ? write_leaf(slot, at) : node_child(node);
+                Size at = next_subtree++->first;
+                if (slot.leaf) child = write_leaf(slot, at);
             }
         }
         write_node(nodes_[place], treelet, children);
-        return deepest + 1;
     }
 
     // Returns the depth of the subtree, its root counted.
     int emit_subtree(const Slot& slot, std::size_t place, Size& cursor) {
-        const Treelet treelet = gather_treelet(tree_, slot.tree);
+        const Treelet treelet = treelet_of(slot);
         Children children{};
         std::size_t child_node = cursor.nodes;
         for (int i = 0; i < treelet.count; ++i) {
@@ -155,17 +169,10 @@ private:
         return deepest + 1;
     }
 
-    Box box_of(const Slot& slot) const {
-        if (slot.tree.has_node()) return tree_.box_of(slot.tree);
-        Box box;
-        for (std::uint32_t i = slot.tree.begin; i < slot.tree.end; ++i) box.grow(tree_.refs[i].box());
-        return box;
-    }
-
     void write_node(StoredNode& out, const Treelet& treelet, const Children& children) const {
         Node node;
         for (int i = 0; i < node_width; ++i) {
-            write_box(node, i, i < treelet.count ? box_of(treelet.slots[static_cast<std::size_t>(i)]) : Box{}, center_);
+            write_box(node, i, i < treelet.count ? tree_.box_of(treelet.slots[static_cast<std::size_t>(i)].tree) : Box{}, center_);
             node.child[i] = children[static_cast<std::size_t>(i)];
         }
         const SlotSequences order = options_.order == ChildOrder::treelet    ? treelet.order
@@ -190,6 +197,7 @@ private:
     const BuildOptions& options_;
     const std::array<float, 3>& center_;
     std::uint32_t subtree_size_ = std::clamp(tree_.count / subtree_count, smallest_subtree, largest_subtree);
+    Coverage coverage_;
     StoredNode* nodes_ = nullptr;
     std::byte* leaves_ = nullptr;
     std::size_t first_leaf_unit_ = 0;

@@ -48,16 +48,22 @@ bool has_area(const Real* a, const Real* b, const Real* c) {
     return false;
 }
 
+Float4v yzx(Float4v x) { return __builtin_shufflevector(x, x, 1, 2, 0, 3); }
+Float4v magnitude(Float4v x) { return maximum(x, Float4v{} - x); }
+
+float projected_area(Float4v a, Float4v b, Float4v c) {
+    const Float4v u = b - a, v = c - a, areas = magnitude(u * yzx(v) - yzx(u) * v);
+    return areas[0] + areas[1] + areas[2];
+}
+
 // Settles it for most: some component of the cross product is larger than its rounding error. Differences and products
 // are off by a unit roundoff u each, sums of two by another: 4u of both products' sizes, taken twice as large, and what
 // underflow may add.
 bool surely_has_area(Float4v a, Float4v b, Float4v c) {
     constexpr float error = 4 * std::numeric_limits<float>::epsilon(), underflow = 4 * std::numeric_limits<float>::min();
     const Float4v u = b - a, v = c - a;
-    const auto yzx = [](Float4v x) { return __builtin_shufflevector(x, x, 1, 2, 0, 3); };
     const Float4v left = u * yzx(v), right = yzx(u) * v;
-    const Float4v cross = left - right, zero = {};
-    const auto magnitude = [&](Float4v x) { return maximum(x, zero - x); };
+    const Float4v cross = left - right;
     const Int4v sure = magnitude(cross) > error * (magnitude(left) + magnitude(right)) + underflow;
     return (sure[0] | sure[1] | sure[2]) != 0;
 }
@@ -72,6 +78,15 @@ bool surely_has_area(const double* a, const double* b, const double* c) {
         sure |= std::abs(left - right) > error * (std::abs(left) + std::abs(right)) + underflow;
     }
     return sure;
+}
+
+float projected_area(const double* a, const double* b, const double* c) {
+    double sum = 0;
+    for (int k = 0; k < 3; ++k) {
+        const int i = (k + 1) % 3, j = (k + 2) % 3;
+        sum += std::abs((b[i] - a[i]) * (c[j] - a[j]) - (b[j] - a[j]) * (c[i] - a[i]));
+    }
+    return static_cast<float>(sum);
 }
 
 // A vertex, with a zero in the fourth lane.
@@ -134,12 +149,14 @@ bool box_triangle(const Mesh<float>& mesh, const Point&, std::size_t face, Box& 
     const Float4v a = load_vertex(mesh, corners[0]), b = load_vertex(mesh, corners[1]),
                   c = load_vertex(mesh, corners[2]);
     box = {minimum(minimum(a, b), c), maximum(maximum(a, b), c)};
+    box.hi[3] = projected_area(a, b, c);
     return surely_has_area(a, b, c) || has_area(mesh.corner(face, 0), mesh.corner(face, 1), mesh.corner(face, 2));
 }
 
 bool box_triangle(const Mesh<double>& mesh, const Point& center, std::size_t face, Box& box) {
     const double *a = mesh.corner(face, 0), *b = mesh.corner(face, 1), *c = mesh.corner(face, 2);
-    box.lo[3] = box.hi[3] = 0;
+    box.lo[3] = 0;
+    box.hi[3] = projected_area(a, b, c);
     for (int axis = 0; axis < 3; ++axis) {
         const float origin = center[static_cast<std::size_t>(axis)];
         box.lo[axis] = plane_below(std::min({a[axis], b[axis], c[axis]}), origin);
@@ -182,7 +199,7 @@ PrimRefs make_prim_refs(const Mesh<Real>& mesh, const Point& center, Threads& th
         Box box, centroids;
     };
     std::vector<Part> parts(chunks);
-    parallel_chunks(mesh.face_count, chunk_size, threads, [&](std::size_t begin, std::size_t end) {
+    parallel_chunks_apart(mesh.face_count, chunk_size, threads, [&](std::size_t begin, std::size_t end) {
         PrimRef* to = all.refs.data() + begin;
         Part part;
         for (std::size_t face = begin; face < end; ++face) {

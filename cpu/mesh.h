@@ -24,11 +24,14 @@ struct Mesh {
     }
 };
 
-// A triangle's box and number, 32 bytes: the number rides in the low corner's fourth lane.
+// A triangle's box, number and size, 32 bytes: the number rides in the low corner's fourth lane, the projected area in the
+// high one's.
 struct PrimRef {
     Float4v lo, hi;
 
     std::uint32_t prim() const { return std::bit_cast<std::uint32_t>(static_cast<float>(lo[3])); }
+    // Twice the sum of the triangle's projections onto the three planes between axes.
+    float projected_area() const { return hi[3]; }
     Box box() const { return {lo, hi}; }
     // Twice the box's centre. The number's bits are cleared first: as a float they would be a slow denormal.
     Float4v centroid() const {
@@ -44,8 +47,9 @@ void check_mesh(const Mesh<Real>& mesh, Threads& threads);
 
 using Point = std::array<float, 3>;
 
-// The box of a triangle; false where it has no area, decided exactly. In float32, boxes are in the mesh's coordinates
-// whatever the tree's centre, and nodes store them relative to it later; in float64 they are relative to it from here on.
+// The box of a triangle, its projected area in the high corner's fourth lane; false where it has no area, decided
+// exactly. In float32, boxes are in the mesh's coordinates whatever the tree's centre, and nodes store them relative to it
+// later; in float64 they are relative to it from here on.
 bool box_triangle(const Mesh<float>& mesh, const Point& center, std::size_t face, Box& box);
 bool box_triangle(const Mesh<double>& mesh, const Point& center, std::size_t face, Box& box);
 

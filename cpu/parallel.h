@@ -3,10 +3,12 @@
 
 #include <algorithm>
 #include <atomic>
+#include <chrono>
 #include <condition_variable>
 #include <cstddef>
 #include <exception>
 #include <mutex>
+#include <numeric>
 #include <thread>
 #include <vector>
 
@@ -26,9 +28,18 @@ inline unsigned thread_count(unsigned asked) {
     return std::max(1u, std::thread::hardware_concurrency());
 }
 
-// The calling thread and, once there is work for them, up to count - 1 helpers, which sleep between one piece of work
-// and the next and end with this object. A helper that the system has not woken yet is not waited for, so on a busy
-// machine the caller goes on alone.
+// Gives other threads the core until ready() or a moment has passed. To wake a sleeping thread takes the system as long as
+// many a piece of work, on virtual cores longer; most waiting here is shorter than that.
+template <class Ready>
+void wait_a_moment(const Ready& ready) {
+    using Clock = std::chrono::steady_clock;
+    for (const auto end = Clock::now() + std::chrono::microseconds(200); !ready() && Clock::now() < end;)
+        std::this_thread::yield();
+}
+
+// The calling thread and, once there is work for them, up to count - 1 helpers, which wait between one piece of work
+// and the next, soon asleep, and end with this object. A helper that the system has not woken yet is not waited for, so on
+// a busy machine the caller goes on alone.
 class Threads {
 public:
     explicit Threads(unsigned count) : count_(count) {}
@@ -89,14 +100,23 @@ private:
     }
 
     void withdraw() {
+        {
+            const std::lock_guard lock(mutex_);
+            job_ = nullptr;
+        }
+        wait_a_moment([this] { return working_ == 0; });
         std::unique_lock lock(mutex_);
-        job_ = nullptr;
         idle_.wait(lock, [this] { return working_ == 0; });
     }
 
     void help() {
-        std::unique_lock lock(mutex_);
         for (std::size_t last = 0;;) {
+            wait_a_moment([&] { return ending_ || job_number_ != last; });
+            std::unique_lock lock(mutex_);
+            if (!job_ && !ending_ && job_number_ != last) {  // missed: the next may come soon, too
+                last = job_number_;
+                continue;
+            }
             wake_.wait(lock, [&] { return ending_ || (job_ && job_number_ != last); });
             if (ending_) return;
             last = job_number_;
@@ -113,10 +133,11 @@ private:
     std::vector<std::thread> helpers_;
     std::mutex mutex_;
     std::condition_variable wake_, idle_;
-    Job* job_ = nullptr;          // null: nothing to do
-    std::size_t job_number_ = 0;  // so that a helper takes each job once
-    unsigned working_ = 0;
-    bool ending_ = false;
+    // Written under the mutex; those that are atomic are watched without it.
+    Job* job_ = nullptr;                       // null: nothing to do
+    std::atomic<std::size_t> job_number_ = 0;  // so that a helper takes each job once
+    std::atomic<unsigned> working_ = 0;
+    std::atomic<bool> ending_ = false;
 };
 
 template <class Work>
@@ -135,6 +156,24 @@ template <class Work>
 void parallel_chunks(std::size_t count, std::size_t chunk, Threads& threads, const Work& work) {
     threads.for_each((count + chunk - 1) / chunk,
                      [&](std::size_t i) { work(i * chunk, std::min(count, (i + 1) * chunk)); });
+}
+
+// The i-th of the numbers below count in an order whose neighbours lie far apart, by steps of the golden ratio. For
+// work that fills fresh memory: threads side by side in it would each clear the same huge page.
+inline std::size_t far_apart(std::size_t i, std::size_t count) {
+    std::size_t step = count * 89 / 144;
+    while (std::gcd(step, count) != 1) ++step;
+    return i * step % count;
+}
+
+// parallel_chunks in that order.
+template <class Work>
+void parallel_chunks_apart(std::size_t count, std::size_t chunk, Threads& threads, const Work& work) {
+    const std::size_t chunks = (count + chunk - 1) / chunk;
+    threads.for_each(chunks, [&](std::size_t i) {
+        const std::size_t begin = far_apart(i, chunks) * chunk;
+        work(begin, std::min(count, begin + chunk));
+    });
 }
 
 }  // namespace wive

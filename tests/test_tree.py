@@ -119,6 +119,31 @@ def test_order_follows_the_split_axes() -> None:
         assert (np.diff(low[node, forwards[:used], 0]) > 0).all()
 
 
+@pytest.mark.parametrize("quality", ["medium", "high"])
+def test_children_stand_in_order_of_how_much_they_cover_for_their_size(quality: str) -> None:
+    vertices, faces = soup(3000, seed=2)
+    bvh = _cpu.Bvh(vertices, faces, quality=quality)
+    low, high = planes(bvh)
+    edges = vertices[faces[:, 1:]].astype(np.float64) - vertices[faces[:, :1]]
+    areas = np.abs(np.cross(edges[:, 0], edges[:, 1])).sum(axis=1)  # twice the projections
+    ways = walk(bvh)
+
+    def prims(child: int) -> list[int]:
+        if child < LEAF:
+            return [prim for node, _, _, below in ways if node == child // 64 for prim in prims(below)]
+        found = bvh.blocks[leaf_blocks(bvh, child), 9].view(np.int32)
+        return found[found >= 0].tolist()
+
+    worth: dict[int, list[float]] = {}
+    for node, lane, _, child in sorted(ways):
+        inside = prims(child)
+        x, y, z = high[node, lane] - low[node, lane]
+        worth.setdefault(node, []).append(areas[inside].sum() / (x * y + y * z + z * x) / len(inside) ** 0.5)
+    assert len(worth) > 50
+    for children in worth.values():
+        assert np.all(np.diff(children) > -1e-4 * np.array(children[1:]))
+
+
 def test_zero_area_triangles_are_left_out_and_keep_their_numbers() -> None:
     vertices = np.float32(
         [[0, 0, 0], [1, 0, 0], [0, 1, 0], [2, 0, 0], [0.1, 0.1, 0.1], [0.3, 0.3, 0.3], [0.7, 0.7, 0.7]]
