@@ -1,5 +1,6 @@
 """float64 trees of the compiled core, queries of them, and brute force in rational numbers."""
 
+import functools
 from fractions import Fraction
 from typing import Any
 
@@ -28,9 +29,12 @@ each_kernel = pytest.mark.parametrize("kernel", kernels())
 each_form = pytest.mark.parametrize("nodes", NODES)
 
 
+unit_sphere = functools.cache(sphere)
+
+
 def sphere64(level: int, radius: float = 1.0, place: tuple[float, ...] = (0.0, 0.0, 0.0)) -> Mesh:
     """A closed sphere whose coordinates are no float32 numbers."""
-    vertices, faces = sphere(level)
+    vertices, faces = unit_sphere(level)
     return vertices.astype(np.float64) * radius + np.asarray(place), faces
 
 
