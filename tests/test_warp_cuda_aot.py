@@ -184,7 +184,9 @@ def test_kernel_with_counters_compiles_for_cuda(lanes: int, tmp_path: Path) -> N
 
 
 @pytest.mark.timeout(120)
-@pytest.mark.parametrize("kernel", [sorting.sort_hits, sorting.shift_counts])
+@pytest.mark.parametrize(
+    "kernel", [sorting.sort_kernel("float32"), sorting.sort_kernel("float64"), sorting.shift_counts]
+)
 def test_kernel_that_orders_hits_keeps_them_in_registers(kernel: wp.Kernel, tmp_path: Path) -> None:
     usage = assemble(compiled_ptx(kernel.module, 90, tmp_path), 90, tmp_path)
     assert usage.spills == usage.stack == 0

@@ -189,6 +189,16 @@ TRIANGLES_4 = """
 #endif
 """
 
+DOUBLE_TRIANGLES_4 = """
+    const double* row = (const double*)((const float*)units + at);
+#if defined(__CUDA_ARCH__)
+    const double2 a = __ldg((const double2*)row), b = __ldg((const double2*)row + 1);
+    return wp::vec_t<4, wp::float64>(a.x, a.y, b.x, b.y);
+#else
+    return wp::vec_t<4, wp::float64>(row[0], row[1], row[2], row[3]);
+#endif
+"""
+
 # Products that no compiler may fuse with an addition, whatever the options of the module they end up in:
 # fused, the two triangles at an edge would not compute the same numbers.
 PRODUCT = """
@@ -199,14 +209,17 @@ PRODUCT = """
 #endif
 """
 PRODUCTS = """
-    wp::vec_t<LENGTH, wp::float32> c;
+    wp::vec_t<LENGTH, wp::REAL> c;
 #if defined(__CUDA_ARCH__)
-    for (int i = 0; i < LENGTH; ++i) c[i] = __fmul_rn(a[i], b[i]);
+    for (int i = 0; i < LENGTH; ++i) c[i] = ROUNDED(a[i], b[i]);
 #else
     for (int i = 0; i < LENGTH; ++i) c[i] = a[i] * b[i];
 #endif
     return c;
 """
+
+# The error of a rounded product, itself exact unless it is subnormal.
+LOW_PART = "return fma(a, b, -rounded);"
 
 # A hit goes to the last free place of its ray's, and the number of those falls. It does not fall below zero:
 # memory stays whole even where rays were overwritten since their hits were counted. On the CPU device a ray's
@@ -219,11 +232,11 @@ LIST_HIT = """
     if (*(const int*)left <= 0) return;
     const int place = --*(int*)left;
 #endif
-    float* hit = (float*)hits + 4 * (wp::int64)place;
+    REAL* hit = (REAL*)hits + 4 * (wp::int64)place;
     hit[0] = t;
     hit[1] = u;
     hit[2] = v;
-    ((int*)hit)[3] = prim;
+    *(int*)(hit + 3) = prim;
 """
 
 

@@ -12,7 +12,7 @@ import warp as wp
 from numpy.typing import ArrayLike
 
 from wive import error_bounds, spawn
-from wive.warp_hits import WarpHits, _in_double
+from wive.warp_hits import WarpHits, in_double
 from wive.warp_rays import RayLoader, WarpRays
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
@@ -98,11 +98,11 @@ def _error_bounds(
         bounds[i] = wp.float64(wp.nan)
         return
     face = faces[prim[i]]
-    v0 = _in_double(vertices[face[0]])
-    first = _in_double(vertices[face[1]]) - v0
-    second = _in_double(vertices[face[2]]) - v0
-    away = v0 - _in_double(origins[i])
-    direction = _in_double(directions[i])
+    v0 = in_double(vertices[face[0]])
+    first = in_double(vertices[face[1]]) - v0
+    second = in_double(vertices[face[2]]) - v0
+    away = v0 - in_double(origins[i])
+    direction = in_double(directions[i])
     t = wp.float64(distance[i])
     normal = _cross(first, second)
     size = _crossed_sizes(first, second)
@@ -187,14 +187,14 @@ def _spawn_origins(
         origins[i] = wp.vec3(wp.nan)
         return
     face = faces[prim[i]]
-    v0 = _in_double(vertices[face[0]])
-    v1 = _in_double(vertices[face[1]])
-    v2 = _in_double(vertices[face[2]])
+    v0 = in_double(vertices[face[0]])
+    v1 = in_double(vertices[face[1]])
+    v2 = in_double(vertices[face[2]])
     first = v1 - v0
     second = v2 - v0
     normal = _cross(first, second)
     area = wp.sqrt(_dot(normal, normal))
-    if _dot(normal, _in_double(directions[i])) < wp.float64(0.0):
+    if _dot(normal, in_double(directions[i])) < wp.float64(0.0):
         normal = -normal
     normal = wp.vec3d(normal[0] / area, normal[1] / area, normal[2] / area)
     u = wp.float64(uv[i][0])
