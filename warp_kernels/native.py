@@ -218,8 +218,18 @@ PRODUCTS = """
     return c;
 """
 
-# The error of a rounded product, itself exact unless it is subnormal.
-LOW_PART = "return fma(a, b, -rounded);"
+# x1 y2 - y1 x2 with the exact sign, as cpu/triangle_watertight_float64.h.
+EXACT_WEIGHT = """
+#if defined(__CUDA_ARCH__)
+    const double a = __dmul_rn(x1, y2), b = __dmul_rn(y1, x2);
+#else
+    const double a = x1 * y2, b = y1 * x2;
+#endif
+    const double a_low = fma(x1, y2, -a), b_low = -fma(y1, x2, -b);
+    const double low = a_low + b_low, b_part = low - a_low;
+    const double lowest = (a_low - (low - b_part)) + (b_low - b_part);
+    return ((a - b) + low) + lowest;
+"""
 
 # A hit goes to the last free place of its ray's, and the number of those falls. It does not fall below zero:
 # memory stays whole even where rays were overwritten since their hits were counted. On the CPU device a ray's

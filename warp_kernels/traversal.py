@@ -12,7 +12,7 @@ from types import SimpleNamespace
 
 import warp as wp
 
-from wive.warp_kernels import triangle_exact, triangle_fast, triangle_watertight, triangle_watertight64
+from wive.warp_kernels import triangle_exact, triangle_fast, triangle_watertight, triangle_watertight_float64
 from wive.warp_kernels.blocks import block_form
 from wive.warp_kernels.frame import FRAMES, box_tmax
 from wive.warp_kernels.handle import (
@@ -41,7 +41,7 @@ TRIANGLES = {
     ("fast", "float32"): (triangle_fast.fast_triangles, triangle_fast.KEPT_WORDS),
     ("fast", "float64"): (triangle_fast.double_triangles, 2 * triangle_fast.KEPT_WORDS),
     ("watertight", "float32"): (triangle_watertight.watertight_triangles, triangle_watertight.KEPT_WORDS),
-    ("watertight", "float64"): (triangle_watertight64.watertight_doubles, triangle_watertight64.KEPT_WORDS),
+    ("watertight", "float64"): (triangle_watertight_float64.watertight_doubles, triangle_watertight_float64.KEPT_WORDS),
     ("exact", "float32"): (triangle_exact.exact_triangles, triangle_exact.KEPT_WORDS),
 }
 

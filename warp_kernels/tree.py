@@ -93,7 +93,7 @@ def upload(bvh: _cpu.Bvh, device: wp.DeviceLike = None) -> Tree:
     handle.error = error
     handle.center = wp.vec3(*bvh.center.tolist())
     handle.extent = wp.vec3(*bvh.extent.tolist())
-    compressed, double = bvh.node_form == "compressed", getattr(bvh, "precision", "float32") == "float64"
+    compressed, double = bvh.node_form == "compressed", bvh.precision == "float64"
     # In units, no node is met twice, nor is a leaf.
     node = (COMPRESSED_NODE_WORDS if compressed else NODE_WORDS) // 8
     block = BLOCK_WORDS // 4 if double else (LEAST_COMPRESSED_WORDS if compressed else BLOCK_WORDS) // 8
@@ -110,7 +110,7 @@ def upload(bvh: _cpu.Bvh, device: wp.DeviceLike = None) -> Tree:
         error=error,
         stack=stack,
         nodes=bvh.node_form,
-        precision=getattr(bvh, "precision", "float32"),
+        precision=bvh.precision,
     )
 
 

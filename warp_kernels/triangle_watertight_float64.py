@@ -1,4 +1,4 @@
-"""Woop, Benthin and Wald 2013 in double on a block of a float64 tree, as cpu/triangle_watertight.h has it."""
+"""Woop, Benthin and Wald 2013 on a block of doubles, as cpu/triangle_watertight.h and _float64.h have it."""
 
 from types import SimpleNamespace
 
@@ -7,38 +7,39 @@ from types import SimpleNamespace
 import warp as wp
 
 from wive.warp_kernels.frame import RayFrame64, axes_of, component
-from wive.warp_kernels.lanes import load_double, lowest_lane, product_double, without_gradient
-from wive.warp_kernels.native import LOW_PART
+from wive.warp_kernels.lanes import load_double, product_double, without_gradient
+from wive.warp_kernels.native import EXACT_WEIGHT
 from wive.warp_kernels.precision import kept_numbers
 
 # What the test keeps of a ray, in words: the axis behind each sheared axis, then doubles: the origin (sheared
 # axis by axis), the shear, and the direction on the longest axis.
 KEPT_WORDS = 3 + 2 * 6
+LEAST_SUM = wp.constant(wp.float64(2.0**-26))
 SMALLEST_SHEAR = wp.constant(wp.float64(2.0**-100))
 
 
-@wp.func_native(LOW_PART)
-def low_part(a: wp.float64, b: wp.float64, rounded: wp.float64) -> wp.float64:
-    """What rounding a b to `rounded` left out, exactly."""
+@wp.func_native(EXACT_WEIGHT)
+def exact_weight(x1: wp.float64, y1: wp.float64, x2: wp.float64, y2: wp.float64) -> wp.float64:
+    """x1 y2 - y1 x2 with the exact sign, and zero only where it is zero."""
     ...
 
 
 @wp.func
 def weight_of(a: wp.vec3d, b: wp.vec3d):
-    """Of the edge from a to b, as all triangles round it."""
+    """The edge function of the edge from a to b, as all triangles round it."""
     return product_double(b[0], a[1]) - product_double(b[1], a[0])
 
 
 @wp.func
-def sign_of(a: wp.vec3d, b: wp.vec3d):
-    """The exact sign of that weight, -1, 0 or 1."""
-    one = product_double(b[0], a[1])
-    other = product_double(b[1], a[0])
-    difference = one - other
-    if difference == wp.float64(0.0):
-        difference = low_part(b[0], a[1], one) - low_part(b[1], a[0], other)
-    zero = wp.float64(0.0)
-    return wp.where(difference > zero, 1, 0) - wp.where(difference < zero, 1, 0)
+def exact_weight_of(a: wp.vec3d, b: wp.vec3d):
+    """The same with the exact sign."""
+    return exact_weight(b[0], b[1], a[0], a[1])
+
+
+@wp.func
+def largest(a: wp.vec3d, b: wp.vec3d, c: wp.vec3d, axis: int):
+    """The largest component of a triangle's corners on an axis."""
+    return wp.max(wp.max(wp.abs(a[axis]), wp.abs(b[axis])), wp.abs(c[axis]))
 
 
 def watertight_doubles(lanes: SimpleNamespace, form: SimpleNamespace, kept: int) -> SimpleNamespace:
@@ -84,37 +85,52 @@ def watertight_doubles(lanes: SimpleNamespace, form: SimpleNamespace, kept: int)
         )
 
     @without_gradient
+    @wp.func
+    def meeting(wa: wp.float64, wb: wp.float64, wc: wp.float64, z: wp.vec3d, stack: stack_argument):
+        """t, u and v from the weights and depths of the corners."""
+        det = wa + wb + wc
+        height = product_double(wa, z[0]) + product_double(wb, z[1]) + product_double(wc, z[2])
+        return wp.vec3d(height / product_double(det, load_kept(stack, 5)), wb / det, wc / det)
+
+    @without_gradient
     @wp.func(inline=False)
     def solve(units: wp.uint64, block: int, j: int, stack: stack_argument, negative: bool):
-        """t, u and v of the rounded triangle, from the weights that the ray passed."""
+        """t, u and v of the rounded triangle; NaN, which no query takes, where its exact weights say miss."""
         a = sheared(units, block, j, 0, stack)
         b = sheared(units, block, j, 1, stack)
         c = sheared(units, block, j, 2, stack)
         wa = weight_of(b, c)
         wb = weight_of(c, a)
         wc = weight_of(a, b)
-        det = wa + wb + wc
-        height = product_double(wa, a[2]) + product_double(wb, b[2]) + product_double(wc, c[2])
-        return wp.vec3d(height / product_double(det, load_kept(stack, 5)), wb / det, wc / det)
+        zero = wp.float64(0.0)
+        reach = product_double(largest(a, b, c, 0), largest(a, b, c, 1))
+        least = product_double(reach, LEAST_SUM)
+        if wp.abs(wa + wb + wc) <= least or wa == zero or wb == zero or wc == zero:
+            return solve_exactly(units, block, j, stack)
+        return meeting(wa, wb, wc, wp.vec3d(a[2], b[2], c[2]), stack)
 
     @without_gradient
     @wp.func(inline=False)
-    def side_of(units: wp.uint64, block: int, j: int, stack: stack_argument):
-        """The side on which the ray passes the edges, 1 or -1, decided exactly; 0 where it misses."""
+    def solve_exactly(units: wp.uint64, block: int, j: int, stack: stack_argument):
+        """The same with the exact signs of weights: on both sides of the ray, or edge-on, is a miss."""
         a = sheared(units, block, j, 0, stack)
         b = sheared(units, block, j, 1, stack)
         c = sheared(units, block, j, 2, stack)
-        u = sign_of(b, c)
-        v = sign_of(c, a)
-        w = sign_of(a, b)
-        negative = wp.where(u < 0 or v < 0 or w < 0, 1, 0)
-        positive = wp.where(u > 0 or v > 0 or w > 0, 1, 0)
-        return positive - negative
+        wa = exact_weight_of(b, c)
+        wb = exact_weight_of(c, a)
+        wc = exact_weight_of(a, b)
+        zero = wp.float64(0.0)
+        hit = meeting(wa, wb, wc, wp.vec3d(a[2], b[2], c[2]), stack)
+        negative = wa < zero or wb < zero or wc < zero
+        positive = wa > zero or wb > zero or wc > zero
+        if negative == positive:
+            hit[0] = wp.float64(wp.nan)
+        return wp.vec3d(hit[0], hit[1] + zero, hit[2] + zero)  # no -0
 
     @without_gradient
     @wp.func
     def candidates(units: wp.uint64, block: int, lane: int, stack: stack_argument):
-        """The lanes whose triangle the ray's line meets, one bit each; the second word is not used."""
+        """The lanes whose triangle the ray's line may meet, one bit each; the second word is not used."""
         x = axis_of(stack, 0)
         y = axis_of(stack, 1)
         z = axis_of(stack, 2)
@@ -142,20 +158,6 @@ def watertight_doubles(lanes: SimpleNamespace, form: SimpleNamespace, kept: int)
         for i in range(length):
             if low[i] >= zero or high[i] <= zero:
                 lanes = lanes | wp.uint32(1 << i)
-        lanes = used(units, block, lane, lanes)
-        if lanes != wp.uint32(0):
-            ties = wp.uint32(0)
-            for i in range(length):
-                if u[i] == zero or v[i] == zero or w[i] == zero:
-                    ties = ties | wp.uint32(1 << i)
-            # Where two products are equal, what rounding left out of them decides.
-            ties = ties & lanes
-            while ties != wp.uint32(0):
-                i = lowest_lane(ties)
-                bit = wp.uint32(1) << wp.uint32(i)
-                ties = ties ^ bit
-                side = side_of(units, block, wp.where(length == 1, lane & 3, i), stack)
-                lanes = lanes & ~wp.where(side == 0, bit, wp.uint32(0))
-        return wp.vec2ui(lanes, wp.uint32(0))
+        return wp.vec2ui(used(units, block, lane, lanes), wp.uint32(0))
 
     return SimpleNamespace(prepare=prepare, candidates=candidates, solve=solve)
