@@ -8,8 +8,7 @@ import warp as wp
 from wive.warp_kernels.handle import SIGN_BIT
 from wive.warp_kernels.precision import PRECISIONS
 
-# The float32 number, in either precision.
-MAX_COORDINATE = 999999984306749440.0
+MAX_COORDINATE = 1e18
 MAX_FLOAT = 3.4028234663852886e38
 MAX_DOUBLE = 1.7976931348623157e308
 SMALLEST_PART = wp.constant(wp.float32(2.0**-30))
