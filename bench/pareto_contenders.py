@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from bench.compiled_shim import BenchError
 from wive import _cpu
-from wive.precision import FLOAT32, Floats, real_named
+from wive.precision import Floats, real_named
 
 Array = NDArray[np.float32]
 Hits = tuple[Floats, NDArray[np.int32]]  # t and prim; prim -1 on a miss
@@ -34,7 +34,7 @@ WIVE = {
 EMBREE = {"embree fast": False, "embree robust": True}
 CONTENDERS = (*WIVE, *EMBREE, "mesh_query_ray")
 
-ZERO, INFINITE = FLOAT32.limits.values()
+ZERO, INFINITE = np.zeros(1, np.float32), np.full(1, np.inf, np.float32)
 
 
 @dataclass(frozen=True)
@@ -80,13 +80,18 @@ def _wive(name: str, kernel: str, vertices: Array, faces: NDArray[np.int32]) -> 
     options = WIVE[name]
     real = real_named(options.precision)
     bvh = _cpu.Bvh(real.array(vertices), faces, options.accuracy, nodes=options.nodes)
-    limits = tuple(real.limits.values())
+    zero, infinite = real.limits.values()
     held: dict[int, Floats] = {}  # rays in this precision: who has such numbers has such rays
+
+    def ready(rays: Array) -> Floats:
+        if id(rays) not in held:
+            held[id(rays)] = real.array(rays)
+        return held[id(rays)]
 
     def tracing(in_flight: int) -> Trace:
         def trace(origins: Array, directions: Array) -> Hits:
-            rays = [held.setdefault(id(array), real.array(array)) for array in (origins, directions)]
-            return bvh.intersect(kernel, *rays, *limits, threads=1, in_flight=in_flight)[:2]
+            o, d = ready(origins), ready(directions)
+            return bvh.intersect(kernel, o, d, zero, infinite, threads=1, in_flight=in_flight)[:2]
 
         return trace
 

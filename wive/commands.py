@@ -162,7 +162,8 @@ def _read_rays(name: str, real: Real) -> tuple[Floats, ...]:
         limits = [loaded[:, 6], loaded[:, 7]] if loaded.shape[1] == 8 else [0.0, np.inf]
         columns = [loaded[:, :3], loaded[:, 3:6], *limits]
     try:
-        return checked_rays(*columns, real)
+        origins, directions, tmin, tmax = columns
+        return checked_rays(origins, directions, tmin, tmax, real)
     except (TypeError, ValueError) as error:
         raise ValueError(f"{name}: {error}") from error
 

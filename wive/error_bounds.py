@@ -33,9 +33,9 @@ def t_error_bounds(
     underflow = UNDERFLOW if vertices.dtype == np.float64 else 0.0
     for rows in blocks_of_hits(prim):
         corners = corner_rows(vertices, faces, prim[rows])
-        ray = (array[rows].astype(np.float64).T for array in (origins, directions))
+        origin, direction = (array[rows].astype(np.float64).T for array in (origins, directions))
         with np.errstate(all="ignore"):
-            bounds[rows] = _bounds(corners, t[rows].astype(np.float64), *ray, underflow)
+            bounds[rows] = _bounds(corners, t[rows].astype(np.float64), origin, direction, underflow)
     return bounds
 
 

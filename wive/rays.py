@@ -28,8 +28,8 @@ class Rays(NamedTuple):
         def host(value: Any) -> Any:
             return library_of(value).to_numpy(value)
 
-        given = (host(value) for value in (self.origins, self.directions, self.tmin, self.tmax))
-        return arguments.rays(*given, real)
+        origins, directions = host(self.origins), host(self.directions)
+        return arguments.rays(origins, directions, host(self.tmin), host(self.tmax), real)
 
 
 def check_rays(
