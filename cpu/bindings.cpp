@@ -48,7 +48,8 @@ Quality parse_quality(const std::string& name) {
     return Quality::medium;
 }
 
-std::unique_ptr<PyBvh> build(Array<float> vertices, Array<std::int32_t> faces, const std::string& accuracy,
+template <class Real>
+std::unique_ptr<PyBvh> build(Array<Real> vertices, Array<std::int32_t> faces, const std::string& accuracy,
                              const std::string& order, unsigned threads, int depth_limit, const std::string& nodes,
                              const std::string& quality) {
     const BuildOptions options = {parse_accuracy(accuracy), parse_nodes(nodes), parse_order(order),
@@ -66,6 +67,7 @@ std::uint64_t render(const PyBvh& self, const std::string& kernel, const Array<f
                      int row_begin, int row_end, int samples, int bounces, const std::string& albedo, std::uint32_t seed,
                      unsigned threads, unsigned in_flight,
                      std::optional<std::pair<std::uintptr_t, std::uintptr_t>> tracer) {
+    expect(self.bvh().precision() == Precision::float32, "render: expected a float32 scene, got float64");
     expect(camera.ndim() == 2 && camera.shape(0) == 4 && camera.shape(1) == 3, "camera: expected shape (4, 3)");
     expect(image.ndim() == 3 && image.shape(2) == 3, "image: expected shape (height, width, 3)");
     expect(0 <= row_begin && row_begin <= row_end && row_end <= image.shape(0), "rows: expected a range within the image");
@@ -73,8 +75,8 @@ std::uint64_t render(const PyBvh& self, const std::string& kernel, const Array<f
     expect(albedo == "gray" || albedo == "normals", "albedo: expected 'gray' or 'normals'");
     const auto row = [&](py::ssize_t i) { return load_vec3(camera.data(i, 0)); };
     const RenderJob job = {self.bvh().view(),
-                           self.mesh(),
-                           find_kernels(kernel),
+                           self.mesh<float>(),
+                           find_kernels<float>(kernel),
                            self.bvh().accuracy(),
                            self.bvh().node_form(),
                            {row(0), row(1), row(2), row(3)},
@@ -128,19 +130,25 @@ PYBIND11_MODULE(_cpu, m, pybind11::mod_gil_not_used()) {
         return names;
     });
     PyBvhClass bvh(m, "Bvh");
-    bvh.def(py::init(&build), array_arg("vertices"), array_arg("faces"), py::arg("accuracy") = "watertight", py::arg("order") = "treelet",
-            py::arg("threads") = 0, py::arg("depth_limit") = max_depth, py::arg("nodes") = "float32",
-             py::arg("quality") = "medium")
-        .def("refitted", [](const PyBvh& self, const Array<float>& vertices, unsigned threads) {
+    for_each_precision([&]<class Real>(Real) {
+        bvh.def(py::init(&build<Real>), array_arg("vertices"), array_arg("faces"), py::arg("accuracy") = "watertight",
+                py::arg("order") = "treelet", py::arg("threads") = 0, py::arg("depth_limit") = max_depth,
+                py::arg("nodes") = "float32", py::arg("quality") = "medium");
+        bvh.def("refitted", [](const PyBvh& self, const Array<Real>& vertices, unsigned threads) {
             return std::make_unique<PyBvh>(self, vertices, threads);
-        }, array_arg("vertices"), py::arg("threads") = 0)
-        .def_property_readonly("vertices", &PyBvh::vertices)
+        }, array_arg("vertices"), py::arg("threads") = 0);
+    });
+    bvh.def_property_readonly("vertices", &PyBvh::vertices)
+        .def_property_readonly("precision", [](const PyBvh& self) {
+            return self.bvh().precision() == Precision::float32 ? "float32" : "float64";
+        })
         .def_property_readonly("nodes", [](py::object self) {
             const Bvh& bvh = self.cast<const PyBvh&>().bvh();
             return rows(self, bvh.nodes(), bvh.node_bytes(), 8);
         })
         .def_property_readonly("blocks", [](py::object self) {
             const Bvh& bvh = self.cast<const PyBvh&>().bvh();
+            if (bvh.precision() == Precision::float64) return rows(self, bvh.blocks(), sizeof(TriangleBlockOf<double>), 4);
             if (bvh.node_form() == NodeForm::compressed) return rows(self, bvh.blocks(), unit_bytes, 8);
             return rows(self, bvh.blocks(), sizeof(TriangleBlock), 4);
         })
@@ -157,8 +165,10 @@ PYBIND11_MODULE(_cpu, m, pybind11::mod_gil_not_used()) {
             const BvhView v = self.bvh().view();
             return copy(std::array{v.extent[0], v.extent[1], v.extent[2]});
         })
-        .def_property_readonly("bounds", [](const PyBvh& self) {
-            return py::array_t<float>({2, 3}, self.bvh().bounds()[0].data());
+        .def_property_readonly("bounds", [](const PyBvh& self) -> py::array {
+            const py::array_t<double> bounds({2, 3}, self.bvh().bounds()[0].data());
+            if (self.bvh().precision() == Precision::float64) return bounds;
+            return py::array_t<float>(bounds);
         })
         .def_property_readonly("accuracy", [](const PyBvh& self) {
             return accuracy_name(self.bvh().accuracy());

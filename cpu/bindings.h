@@ -9,6 +9,7 @@
 #include <stdexcept>
 #include <string>
 #include <utility>
+#include <variant>
 
 #include "builder.h"
 
@@ -34,40 +35,59 @@ void expect_shape(const Array<T>& array, py::ssize_t columns, const char* messag
 // The tree together with the arrays it was built from, which rendering reads.
 class PyBvh {
 public:
-    PyBvh(Array<float> vertices, Array<std::int32_t> faces, const BuildOptions& options)
+    template <class Real>
+    PyBvh(Array<Real> vertices, Array<std::int32_t> faces, const BuildOptions& options)
         : vertices_(std::move(vertices)), faces_(std::move(faces)), options_(options) {
-        expect_shape(vertices_, 3, "vertices: expected shape (v, 3)");
+        expect_shape(std::get<Array<Real>>(vertices_), 3, "vertices: expected shape (v, 3)");
         expect_shape(faces_, 3, "faces: expected shape (f, 3)");
         expect(options.depth_limit >= 1 && options.depth_limit <= max_depth, "depth_limit: expected 1 to 64");
-        const Mesh view = mesh();
+        const Mesh view = mesh<Real>();
         py::gil_scoped_release release;
         bvh_ = std::make_unique<Bvh>(view, options_);
     }
 
     // The same faces over moved vertices. Where the tree can't be kept it is built anew.
-    PyBvh(const PyBvh& other, Array<float> vertices, unsigned threads)
+    template <class Real>
+    PyBvh(const PyBvh& other, Array<Real> vertices, unsigned threads)
         : vertices_(std::move(vertices)), faces_(other.faces_), options_(other.options_) {
-        expect_shape(vertices_, 3, "vertices: expected shape (v, 3)");
+        other.expect_precision<Real>();
+        expect_shape(std::get<Array<Real>>(vertices_), 3, "vertices: expected shape (v, 3)");
         options_.threads = threads;
-        const Mesh view = mesh();
+        const Mesh view = mesh<Real>();
         py::gil_scoped_release release;
         bvh_ = other.bvh_->refitted(view, threads);
         if (!bvh_) bvh_ = std::make_unique<Bvh>(view, options_);
     }
 
     const Bvh& bvh() const { return *bvh_; }
-    const Array<float>& vertices() const { return vertices_; }
-    Mesh mesh() const {
-        return {vertices_.data(), static_cast<std::size_t>(vertices_.shape(0)), faces_.data(),
+    const std::variant<Array<float>, Array<double>>& vertices() const { return vertices_; }
+    template <class Real>
+    Mesh<Real> mesh() const {
+        const auto& vertices = std::get<Array<Real>>(vertices_);
+        return {vertices.data(), static_cast<std::size_t>(vertices.shape(0)), faces_.data(),
                 static_cast<std::size_t>(faces_.shape(0))};
+    }
+    // That arrays of Real are what this tree takes.
+    template <class Real>
+    void expect_precision() const {
+        expect(std::holds_alternative<Array<Real>>(vertices_),
+               precision_of<Real> == Precision::float32 ? "expected arrays in float64, as the vertices are, got float32"
+                                                        : "expected arrays in float32, as the vertices are, got float64");
     }
 
 private:
-    Array<float> vertices_;
+    std::variant<Array<float>, Array<double>> vertices_;
     Array<std::int32_t> faces_;
     BuildOptions options_;
     std::unique_ptr<Bvh> bvh_;
 };
+
+// Defines the same for either precision: define(Real{}). Python picks by dtype, and float32 is asked first.
+template <class Define>
+void for_each_precision(const Define& define) {
+    define(float{});
+    define(double{});
+}
 
 using PyBvhClass = py::class_<PyBvh>;
 

@@ -10,8 +10,8 @@ namespace {
 constexpr std::size_t hits_per_chunk = 1 << 12;
 
 // Calls row(i, corners of hit i, three values of the answer) for every hit, in double, on every core.
-template <class Row>
-py::array_t<double> each_hit(const Array<float>& vertices, const Array<std::int32_t>& faces, const Array<std::int32_t>& prim,
+template <class Real, class Row>
+py::array_t<double> each_hit(const Array<Real>& vertices, const Array<std::int32_t>& faces, const Array<std::int32_t>& prim,
                              const Row& row) {
     expect_shape(vertices, 3, "vertices: expected shape (v, 3)");
     expect_shape(faces, 3, "faces: expected shape (f, 3)");
@@ -19,7 +19,7 @@ py::array_t<double> each_hit(const Array<float>& vertices, const Array<std::int3
     py::array_t<double> answer({count, py::ssize_t{3}});
     double* out = answer.mutable_data();
     const std::int32_t *prims = prim.data(), *corners = faces.data();
-    const float* points = vertices.data();
+    const Real* points = vertices.data();
     const auto face_count = static_cast<std::size_t>(faces.shape(0)), point_count = static_cast<std::size_t>(vertices.shape(0));
     const auto hits = static_cast<std::size_t>(count);
     py::gil_scoped_release release;
@@ -42,11 +42,12 @@ py::array_t<double> each_hit(const Array<float>& vertices, const Array<std::int3
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 
-py::array_t<double> points(const Array<float>& vertices, const Array<std::int32_t>& faces, const Array<std::int32_t>& prim,
-                           const Array<float>& uv) {
+template <class Real>
+py::array_t<double> points(const Array<Real>& vertices, const Array<std::int32_t>& faces, const Array<std::int32_t>& prim,
+                           const Array<Real>& uv) {
     expect_shape(uv, 2, "uv: expected shape (n, 2)");
     expect(uv.shape(0) == prim.size(), "uv: expected as many as prim");
-    const float* weights = uv.data();
+    const Real* weights = uv.data();
     return each_hit(vertices, faces, prim, [=](std::size_t i, bool known, const double (&corner)[3][3], double* out) {
         const double u = weights[2 * i], v = weights[2 * i + 1];
         for (int axis = 0; axis < 3; ++axis)
@@ -54,7 +55,8 @@ py::array_t<double> points(const Array<float>& vertices, const Array<std::int32_
     });
 }
 
-py::array_t<double> normals(const Array<float>& vertices, const Array<std::int32_t>& faces,
+template <class Real>
+py::array_t<double> normals(const Array<Real>& vertices, const Array<std::int32_t>& faces,
                             const Array<std::int32_t>& prim) {
     return each_hit(vertices, faces, prim, [](std::size_t, bool known, const double (&corner)[3][3], double* out) {
         double a[3], b[3];
@@ -71,8 +73,10 @@ py::array_t<double> normals(const Array<float>& vertices, const Array<std::int32
 }  // namespace
 
 void bind_surface(py::module_& m) {
-    m.def("surface_points", &points, array_arg("vertices"), array_arg("faces"), array_arg("prim"), array_arg("uv"));
-    m.def("surface_normals", &normals, array_arg("vertices"), array_arg("faces"), array_arg("prim"));
+    for_each_precision([&]<class Real>(Real) {
+        m.def("surface_points", &points<Real>, array_arg("vertices"), array_arg("faces"), array_arg("prim"), array_arg("uv"));
+        m.def("surface_normals", &normals<Real>, array_arg("vertices"), array_arg("faces"), array_arg("prim"));
+    });
 }
 
 }  // namespace wive

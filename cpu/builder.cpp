@@ -16,29 +16,47 @@ namespace wive {
 namespace {
 
 // In blocks of four triangles.
-constexpr std::uint32_t largest_leaf(NodeForm form) {
-    return form == NodeForm::float32 ? max_leaf_blocks : max_compressed_leaf / block_width;
+constexpr std::uint32_t largest_leaf(Precision precision, NodeForm form) {
+    const bool shared = precision == Precision::float32 && form == NodeForm::compressed;
+    return shared ? max_compressed_leaf / block_width : max_leaf_blocks;
 }
 
 }  // namespace
 
-Bvh::Bvh(const Mesh& mesh, const BuildOptions& options) : accuracy_(options.accuracy), form_(options.nodes) {
+template <class Real>
+Bvh::Bvh(const Mesh<Real>& mesh, const BuildOptions& options)
+    : accuracy_(options.accuracy), precision_(precision_of<Real>), form_(options.nodes) {
+    constexpr bool doubles = precision_of<Real> == Precision::float64;
     Threads threads(thread_count(options.threads));
     if (mesh.face_count >= leaf_bit) throw std::invalid_argument("faces: too many triangles for one scene");
+    if (doubles && accuracy_ == Accuracy::exact)
+        throw std::invalid_argument("accuracy: 'exact' takes vertices in float32, got float64; round them, or use 'watertight'");
     check_mesh(mesh, threads);
-    BinaryTree tree = build_binary_tree(make_prim_refs(mesh, threads), threads, options.depth_limit, largest_leaf(form_));
+    if constexpr (doubles) set_center(find_bounds(mesh, threads));
+    const auto plant = [&] {
+        return build_binary_tree(make_prim_refs(mesh, center_, threads), threads, options.depth_limit,
+                                 largest_leaf(precision_, form_));
+    };
+    BinaryTree tree = plant();
     if (options.quality == Quality::high) optimize_by_reinsertion(tree, threads);
     triangle_count_ = tree.count;
-    set_bounds(tree.box);
-    EmittedTree emitted = emit_tree(tree, mesh, options, center_, threads);
+    if constexpr (doubles)
+        set_extent(tree.box);
+    else
+        set_bounds(tree.box);
+    const Point still_to_center = doubles ? Point{} : center_;
+    EmittedTree emitted = emit_tree(tree, mesh, options, still_to_center, threads);
     if (emitted.depth > options.depth_limit) {  // reinsertion knows no limit, binning does
-        tree = build_binary_tree(make_prim_refs(mesh, threads), threads, options.depth_limit, largest_leaf(form_));
-        emitted = emit_tree(tree, mesh, options, center_, threads);
+        tree = plant();
+        emitted = emit_tree(tree, mesh, options, still_to_center, threads);
     }
     units_ = std::move(emitted.units);
     node_count_ = emitted.node_count;
     depth_ = emitted.depth;
 }
+
+template Bvh::Bvh(const Mesh<float>&, const BuildOptions&);
+template Bvh::Bvh(const Mesh<double>&, const BuildOptions&);
 
 void Bvh::set_bounds(const Box& box) {
     for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -53,10 +71,26 @@ void Bvh::set_bounds(const Box& box) {
         const float size = std::max({half[0], half[1], half[2]});
         for (std::size_t axis = 0; axis < 3; ++axis) {
             center_[axis] = std::abs(middle[axis]) > 4 * size ? middle[axis] : 0.0f;
-            extent_[axis] = std::max(plane_above(bounds_[1][axis], center_[axis]),
-                                     -plane_below(bounds_[0][axis], center_[axis]));
+            extent_[axis] = std::max(plane_above(box.hi[axis], center_[axis]), -plane_below(box.lo[axis], center_[axis]));
         }
     }
+}
+
+// The same for float64, where boxes need the centre first and the extent comes from them.
+void Bvh::set_center(const Bounds& bounds) {
+    bounds_ = bounds;
+    const auto& [low, high] = bounds_;
+    if (!(low[0] <= high[0])) return;
+    const double size = 0.5 * std::max({high[0] - low[0], high[1] - low[1], high[2] - low[2]});
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+        const double middle = 0.5 * low[axis] + 0.5 * high[axis];
+        center_[axis] = std::abs(middle) > 4 * size ? static_cast<float>(middle) : 0.0f;
+    }
+}
+
+void Bvh::set_extent(const Box& box) {
+    if (!(box.lo[0] <= box.hi[0])) return;
+    for (std::size_t axis = 0; axis < 3; ++axis) extent_[axis] = std::max(box.hi[axis], -box.lo[axis]);
 }
 
 BvhView Bvh::view() const {
@@ -85,7 +119,7 @@ Bvh::Sah Bvh::sah_of(double root) const {
 
 Bvh::Sah Bvh::sah() const {
     double d[3];
-    for (std::size_t axis = 0; axis < 3; ++axis) d[axis] = static_cast<double>(bounds_[1][axis]) - bounds_[0][axis];
+    for (std::size_t axis = 0; axis < 3; ++axis) d[axis] = bounds_[1][axis] - bounds_[0][axis];
     const double root = d[0] * d[1] + d[1] * d[2] + d[2] * d[0];
     if (!(root > 0 && root < std::numeric_limits<double>::infinity())) return {0, 0};
     return form_ == NodeForm::float32 ? sah_of<Node>(root) : sah_of<CompressedNode>(root);

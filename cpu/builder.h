@@ -30,11 +30,14 @@ struct BuildOptions {
 class Bvh {
 public:
     // Throws std::invalid_argument on a mesh that check_mesh refuses. The same tree whatever the threads.
-    Bvh(const Mesh& mesh, const BuildOptions& options);
+    template <class Real>
+    Bvh(const Mesh<Real>& mesh, const BuildOptions& options);
 
     // The same tree over moved vertices; null where a triangle that had no area, and so no leaf, now has one, and for
     // compressed trees, whose leaves may need other sizes. Throws as building does.
-    std::unique_ptr<Bvh> refitted(const Mesh& mesh, unsigned threads) const;
+    // Real is that of the mesh it was built from.
+    template <class Real>
+    std::unique_ptr<Bvh> refitted(const Mesh<Real>& mesh, unsigned threads) const;
 
     BvhView view() const;
     std::size_t bytes() const { return units_.size(); }
@@ -43,9 +46,10 @@ public:
     std::span<const std::byte> blocks() const { return {units_.data() + nodes().size(), bytes() - nodes().size()}; }
     std::size_t node_bytes() const { return form_ == NodeForm::float32 ? sizeof(Node) : sizeof(CompressedNode); }
     Accuracy accuracy() const { return accuracy_; }
+    Precision precision() const { return precision_; }
     NodeForm node_form() const { return form_; }
     int depth() const { return depth_; }
-    std::array<std::array<float, 3>, 2> bounds() const { return bounds_; }
+    const Bounds& bounds() const { return bounds_; }
 
     struct Sah {
         double nodes, blocks;
@@ -56,16 +60,19 @@ public:
 private:
     Bvh() = default;
     void set_bounds(const Box& box);
+    void set_center(const Bounds& bounds);
+    void set_extent(const Box& box);
     template <class StoredNode>
     Sah sah_of(double root) const;
 
     LargeArray<std::byte> units_;
     std::size_t node_count_ = 0, triangle_count_ = 0;
     Accuracy accuracy_ = Accuracy::watertight;
+    Precision precision_ = Precision::float32;
     NodeForm form_ = NodeForm::float32;
     int depth_ = 0;
-    std::array<float, 3> center_{}, extent_{};
-    std::array<std::array<float, 3>, 2> bounds_{};
+    Point center_{}, extent_{};
+    Bounds bounds_{};
 };
 
 }  // namespace wive

@@ -5,8 +5,17 @@
 
 namespace wive {
 
-// Two cache lines hold a node, three a block of either size wherever it begins.
-struct CompressedForm {
+// Two cache lines hold a node, three a block of either size wherever it begins. Blocks of doubles are not compressed.
+template <class Real>
+struct CompressedForm;
+
+template <>
+struct CompressedForm<double> : Float32Form<double> {
+    using Node = CompressedNode;
+};
+
+template <>
+struct CompressedForm<float> {
     using Node = CompressedNode;
     using Block = CompressedBlock;
     template <class Isa>
@@ -17,14 +26,14 @@ struct CompressedForm {
 // As FullSlabs; the distance to a plane is byte * (step * rdir) + (origin * rdir + bias).
 template <class Isa>
 struct CompressedSlabs {
-    using Form = CompressedForm;
+    using Form = CompressedForm<typename Isa::Real>;
     using Float8 = typename Isa::Float8;
 
     Float8 rdir[3], near_bias[3], far_bias[3], tmin;
     std::size_t near_row[3], far_row[3];  // in planes, which are bytes, from the node's first
     unsigned order_shift;
 
-    [[gnu::always_inline]] explicit CompressedSlabs(const RayFrame<Isa>& ray) : tmin(Float8::all(ray.tmin)) {
+    [[gnu::always_inline]] explicit CompressedSlabs(const RayFrame<Isa>& ray) : tmin(Float8::all(ray.interval.entry())) {
         for (unsigned axis = 0; axis < 3; ++axis) {
             rdir[axis] = Float8::all(ray.rdir[axis]);
             near_bias[axis] = Float8::all(ray.near_bias[axis]);

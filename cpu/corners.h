@@ -9,16 +9,16 @@ namespace wive {
 // Rows as they are stored; in a `fast` tree those of the second and third vertex hold the edges from the first.
 template <class Isa>
 struct StoredCorners {
-    using Float4 = typename Isa::Float4;
-    using Block = TriangleBlock;
+    using Real4 = typename Isa::Real4;
+    using Block = TriangleBlockOf<typename Isa::Real>;
 
     const Block& block;
 
     [[gnu::always_inline]] explicit StoredCorners(const Block& of) : block(of) {}
-    [[gnu::always_inline]] Float4 vertex(std::size_t k, std::size_t axis) const {
-        return Float4::load(block.rows[3 * k + axis]);
+    [[gnu::always_inline]] Real4 vertex(std::size_t k, std::size_t axis) const {
+        return Real4::load(block.rows[3 * k + axis]);
     }
-    [[gnu::always_inline]] Float4 edge(std::size_t k, std::size_t axis, Float4) const { return vertex(k, axis); }
+    [[gnu::always_inline]] Real4 edge(std::size_t k, std::size_t axis, Real4) const { return vertex(k, axis); }
     // Of lanes that passed a test, those that hold a triangle: NaN has made the others fail.
     [[gnu::always_inline]] unsigned used(unsigned lanes) const { return lanes; }
 };

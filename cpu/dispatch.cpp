@@ -29,7 +29,8 @@ bool has_avx512() { return false; }
 
 struct Entry {
     std::string_view name;
-    const KernelTable* table;
+    const KernelTable<float>* table;
+    const KernelTable<double>* table64;  // null where the name is for comparisons of float32 traversals only
     bool runs;
     std::string_view needs;
 };
@@ -38,13 +39,13 @@ struct Entry {
 const std::vector<Entry>& entries() {
     constexpr std::string_view avx512 = "AVX-512 F, VL, DQ or BW", avx2 = "AVX2, FMA, BMI1, BMI2, LZCNT or POPCNT";
     static const std::vector<Entry> all = {
-        {"avx512", avx512_full_kernels(), has_avx512(), avx512},
-        {"avx512.full", avx512_full_kernels(), has_avx512(), avx512},
-        {"avx512.half", avx512_half_kernels(), has_avx512(), avx512},
-        {"avx512.distance", avx512_by_distance_kernels(), has_avx512(), avx512},
-        {"avx2", avx2_kernels(), has_avx2(), avx2},
-        {"scalar", scalar_kernels(), true, ""},
-        {"scalar.distance", scalar_by_distance_kernels(), true, ""},
+        {"avx512", avx512_full_kernels(), avx512_float64_kernels(), has_avx512(), avx512},
+        {"avx512.full", avx512_full_kernels(), avx512_float64_kernels(), has_avx512(), avx512},
+        {"avx512.half", avx512_half_kernels(), nullptr, has_avx512(), avx512},
+        {"avx512.distance", avx512_by_distance_kernels(), nullptr, has_avx512(), avx512},
+        {"avx2", avx2_kernels(), avx2_float64_kernels(), has_avx2(), avx2},
+        {"scalar", scalar_kernels(), scalar_float64_kernels(), true, ""},
+        {"scalar.distance", scalar_by_distance_kernels(), nullptr, true, ""},
     };
     return all;
 }
@@ -63,14 +64,21 @@ std::vector<std::pair<std::string, std::string>> list_kernels() {
     return list;
 }
 
-const KernelTable& find_kernels(std::string_view name) {
+template <class Real>
+const KernelTable<Real>& find_kernels(std::string_view name) {
     for (const Entry& entry : entries()) {
         if (entry.name != name) continue;
         if (const std::string reason = why_not(entry); !reason.empty())
             throw std::invalid_argument("kernel '" + std::string(name) + "' can't run here: " + reason);
-        return *entry.table;
+        if constexpr (precision_of<Real> == Precision::float32) return *entry.table;
+        else if (entry.table64 != nullptr) return *entry.table64;
+        else
+            throw std::invalid_argument("kernel '" + std::string(name) + "' traces float32 scenes only: give vertices in float32, or use 'avx512', 'avx2' or 'scalar'");
     }
     throw std::invalid_argument("unknown kernel '" + std::string(name) + "'");
 }
+
+template const KernelTable<float>& find_kernels(std::string_view);
+template const KernelTable<double>& find_kernels(std::string_view);
 
 }  // namespace wive

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <span>
 #include <stdexcept>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -34,12 +35,12 @@ private:
 };
 
 // Plans where everything goes; Writer knows what the nodes and blocks there look like.
-template <class Writer>
+template <class Writer, class Real>
 class Emitter {
     using StoredNode = typename Writer::Node;
 
 public:
-    Emitter(const BinaryTree& tree, const Mesh& mesh, const BuildOptions& options, const std::array<float, 3>& center)
+    Emitter(const BinaryTree& tree, const Mesh<Real>& mesh, const BuildOptions& options, const std::array<float, 3>& center)
         : tree_(tree), mesh_(mesh), options_(options), center_(center) {}
 
     using Size = TreeSize;
@@ -185,7 +186,7 @@ private:
     }
 
     const BinaryTree& tree_;
-    const Mesh& mesh_;
+    const Mesh<Real>& mesh_;
     const BuildOptions& options_;
     const std::array<float, 3>& center_;
     std::uint32_t subtree_size_ = std::clamp(tree_.count / subtree_count, smallest_subtree, largest_subtree);
@@ -196,11 +197,16 @@ private:
 
 }  // namespace
 
-EmittedTree emit_tree(const BinaryTree& tree, const Mesh& mesh, const BuildOptions& options,
+template <class Real>
+EmittedTree emit_tree(const BinaryTree& tree, const Mesh<Real>& mesh, const BuildOptions& options,
                       const std::array<float, 3>& center, Threads& threads) {
+    using Compressed = std::conditional_t<precision_of<Real> == Precision::float32, CompressedWriter, CompressedFloat64Writer>;
     if (options.nodes == NodeForm::compressed)
-        return Emitter<CompressedWriter>(tree, mesh, options, center).emit(threads);
-    return Emitter<Float32Writer>(tree, mesh, options, center).emit(threads);
+        return Emitter<Compressed, Real>(tree, mesh, options, center).emit(threads);
+    return Emitter<Float32Writer<Real>, Real>(tree, mesh, options, center).emit(threads);
 }
+
+template EmittedTree emit_tree(const BinaryTree&, const Mesh<float>&, const BuildOptions&, const std::array<float, 3>&, Threads&);
+template EmittedTree emit_tree(const BinaryTree&, const Mesh<double>&, const BuildOptions&, const std::array<float, 3>&, Threads&);
 
 }  // namespace wive

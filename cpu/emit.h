@@ -26,8 +26,10 @@ struct LeafSize {
 };
 
 // Children of a node stand side by side, then subtree after subtree; the same on any number of threads. Throws
-// std::invalid_argument where the tree is larger than child references reach.
-EmittedTree emit_tree(const BinaryTree& tree, const Mesh& mesh, const BuildOptions& options,
+// std::invalid_argument where the tree is larger than child references reach. center: what the tree's boxes are still to be
+// made relative to.
+template <class Real>
+EmittedTree emit_tree(const BinaryTree& tree, const Mesh<Real>& mesh, const BuildOptions& options,
                       const std::array<float, 3>& center, Threads& threads);
 
 }  // namespace wive

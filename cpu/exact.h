@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstddef>
 
 namespace wive {
@@ -29,7 +30,21 @@ int sign_of_sum(const std::array<double, count>& terms) {
     return (largest > 0) - (largest < 0);
 }
 
-// The exact sign of the area of (a, b, c) in the plane. A product of two floats is exact in double.
+// The exact sign of the area of (a, b, c) in the plane. A product of two floats is exact in double;
+// one of doubles is the sum of two, unless it underflows: coordinates are zero or above 1e-130.
+inline int orientation(const double a[2], const double b[2], const double c[2]) {
+    std::array<double, 12> terms{};
+    std::size_t count = 0;
+    const auto add_product = [&](double x, double y) {  // and what rounding it takes off
+        terms[count] = x * y;
+        terms[count + 1] = std::fma(x, y, -terms[count]);
+        count += 2;
+    };
+    add_product(a[0], b[1]), add_product(-a[1], b[0]);
+    add_product(b[0], c[1]), add_product(-b[1], c[0]);
+    add_product(c[0], a[1]), add_product(-c[1], a[0]);
+    return sign_of_sum(terms);
+}
 inline int orientation(const float a[2], const float b[2], const float c[2]) {
     const auto product = [](float x, float y) { return static_cast<double>(x) * static_cast<double>(y); };
     return sign_of_sum(std::array<double, 6>{product(a[0], b[1]), -product(a[1], b[0]),    //

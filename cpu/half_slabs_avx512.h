@@ -12,14 +12,14 @@ namespace wive {
 // by negating reciprocal and bias there.
 template <class Isa>
 struct HalfSlabs {
-    using Form = Float32Form;
+    using Form = Float32Form<float>;
 
     __m512 rdir[3], bias[3];
     __m512 tmin_and_tmax;
     std::size_t near_row[3], far_row[3];  // in planes from the node's first
     unsigned order_shift;
 
-    WIVE_INLINE explicit HalfSlabs(const RayFrame<Isa>& ray) : tmin_and_tmax(both(ray.tmin, -ray.tmax)) {
+    WIVE_INLINE explicit HalfSlabs(const RayFrame<Isa>& ray) : tmin_and_tmax(both(ray.interval.tmin, -ray.interval.tmax)) {
         for (unsigned axis = 0; axis < 3; ++axis) {
             rdir[axis] = both(ray.rdir[axis], -ray.rdir[axis]);
             bias[axis] = both(ray.near_bias[axis], -ray.far_bias[axis]);

@@ -10,16 +10,20 @@
 
 namespace wive {
 
+template <class Real>
 struct FoundHit {
     std::size_t ray;  // in its batch
-    float t, u, v;
+    Real t, u, v;
     std::int32_t prim;
 };
 
 // A list in chunks that double in size: what was found is never moved, and at most as much again stands empty.
 // All but `add` is compiled once, in hit_list.cpp, not for each instruction set: the linker keeps one copy of an
 // inline function, and it may be one that this machine can't run.
+template <class Real>
 class alignas(64) HitList {
+    using FoundHit = wive::FoundHit<Real>;
+
 public:
     HitList();
     ~HitList();

@@ -14,7 +14,7 @@ namespace wive {
 template <class Frame, class Query, class Counters>
 struct alignas(64) Flight {
     Frame ray;
-    Query query{0, 0};
+    Query query{};
     [[no_unique_address]] Counters counters;
     Stack::Top top;
     std::size_t index = 0;  // of the ray in its batch
@@ -23,12 +23,15 @@ struct alignas(64) Flight {
 
 template <class Isa, template <class> class Slabs, template <class> class Triangles, class Query, class Counters>
 class InFlight {
+    using Rays = RayBatch<typename Isa::Real>;
+    using Hits = HitBatch<typename Isa::Real>;
+
 public:
     using State = Flight<typename Triangles<Isa>::Frame, Query, Counters>;
     using Form = typename Slabs<Isa>::Form;
     using Corners = typename Form::template Corners<Isa>;
 
-    [[gnu::always_inline]] InFlight(const BvhView& bvh, const RayBatch& rays, const HitBatch& hits,
+    [[gnu::always_inline]] InFlight(const BvhView& bvh, const Rays& rays, const Hits& hits,
                                     const RaySource& source, std::byte* scratch)
         : bvh_(bvh), rays_(rays), hits_(hits), source_(source), flights_(reinterpret_cast<State*>(scratch)) {}
 
@@ -57,7 +60,7 @@ private:
                 end_ = next_;
                 return;
             }
-            new (&f.query) Query{0, 0};  // in place: a temporary copied over would stall on its own stores
+            new (&f.query) Query{};  // in place: a temporary copied over would stall on its own stores
             f.counters = Counters{};
             if (f.ray.load(bvh_, rays_, next_)) break;
             f.query.write(hits_, next_, 1);
@@ -74,7 +77,7 @@ private:
     // in one: no branch.
     [[gnu::always_inline]] static void wait(const BvhView& bvh, State& f, Stack::Top top, Ends& ends) {
         if constexpr (Query::in_order)
-            while (top.distance() > f.query.tmax) top.move(-1);
+            while (top.distance() > f.query.interval.reach()) top.move(-1);
         f.top = top;
         const std::uint32_t child = top.child();
         prefetch<Form>(bvh, child);
@@ -93,7 +96,7 @@ private:
             State& f = **i;
             Stack::Top top = f.top;
             f.counters.inner_node();
-            visit<Query::in_order>(bvh.template node<Form>(top.child()), Slabs<Isa>(f.ray), f.query.tmax, top);
+            visit<Query::in_order>(bvh.template node<Form>(top.child()), Slabs<Isa>(f.ray), f.query.interval.reach(), top);
             wait(bvh, f, top, ends);
         }
         ends_ = ends;
@@ -129,8 +132,8 @@ private:
     }
 
     const BvhView bvh_;
-    const RayBatch rays_;
-    const HitBatch hits_;
+    const Rays rays_;
+    const Hits hits_;
     const RaySource source_;
     State* flights_;
     State *at_node_[max_in_flight + 1], *at_leaf_[max_in_flight + 1], *done_[max_in_flight + 1];
@@ -139,8 +142,9 @@ private:
 };
 
 template <class Isa, template <class> class Slabs, template <class> class Triangles, class Query, class Counters>
-void trace_batch(const BvhView& bvh, const RayBatch& rays, const HitBatch& hits, const RaySource& source,
-                 unsigned in_flight, std::byte* scratch) {
+void trace_batch(const BvhView& bvh, const RayBatch<typename Isa::Real>& rays,
+                 const HitBatch<typename Isa::Real>& hits, const RaySource& source, unsigned in_flight,
+                 std::byte* scratch) {
     if (in_flight <= 1)
         trace_one_by_one<Isa, Slabs, Triangles, Query, Counters>(bvh, rays, hits, source);
     else

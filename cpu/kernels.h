@@ -36,17 +36,20 @@ constexpr KernelChoice kernel_choice(std::size_t index) {
 
 // One thread's share of a batch: rays come from the source until it is empty. in_flight rays are traced in turns;
 // 1 is plain single-ray traversal. scratch: in_flight * flight_bytes of 64-byte aligned memory where it is above 1.
-using TraceBatch = void (*)(const BvhView&, const RayBatch&, const HitBatch&, const RaySource&, unsigned in_flight,
-                            std::byte* scratch);
+template <class Real>
+using TraceBatch = void (*)(const BvhView&, const RayBatch<Real>&, const HitBatch<Real>&, const RaySource&,
+                            unsigned in_flight, std::byte* scratch);
 
+// The kernels for scenes of one precision.
+template <class Real>
 struct KernelTable {
     std::string_view name;
     std::size_t flight_bytes;  // of the largest kernel
-    std::array<TraceBatch, kernel_count> kernels;
+    std::array<TraceBatch<Real>, kernel_count> kernels;
 
     // Throws std::invalid_argument where the table was not made for such nodes.
-    TraceBatch find(KernelChoice choice) const {
-        const TraceBatch kernel = kernels[kernel_index(choice)];
+    TraceBatch<Real> find(KernelChoice choice) const {
+        const TraceBatch<Real> kernel = kernels[kernel_index(choice)];
         if (kernel == nullptr)
             throw std::invalid_argument("kernel '" + std::string(name) + "' traces float32 nodes only: build with nodes 'float32'");
         return kernel;
@@ -54,11 +57,15 @@ struct KernelTable {
 };
 
 // Null where this build has no such kernels; whether the machine can run them is dispatch.h's business.
-const KernelTable* avx512_full_kernels();
-const KernelTable* avx512_half_kernels();
-const KernelTable* avx512_by_distance_kernels();
-const KernelTable* avx2_kernels();
-const KernelTable* scalar_kernels();
-const KernelTable* scalar_by_distance_kernels();
+const KernelTable<float>* avx512_full_kernels();
+const KernelTable<float>* avx512_half_kernels();
+const KernelTable<float>* avx512_by_distance_kernels();
+const KernelTable<float>* avx2_kernels();
+const KernelTable<float>* scalar_kernels();
+const KernelTable<float>* scalar_by_distance_kernels();
+
+const KernelTable<double>* avx512_float64_kernels();
+const KernelTable<double>* avx2_float64_kernels();
+const KernelTable<double>* scalar_float64_kernels();
 
 }  // namespace wive

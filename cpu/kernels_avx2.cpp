@@ -7,11 +7,11 @@
 #include "slabs.h"
 
 namespace wive {
-static constexpr KernelTable table = make_kernel_table<Avx2, FullSlabs, CompressedSlabs>("avx2");
-const KernelTable* avx2_kernels() { return &table; }
+static constexpr KernelTable<float> table = make_kernel_table<Avx2, FullSlabs, CompressedSlabs>("avx2");
+const KernelTable<float>* avx2_kernels() { return &table; }
 }  // namespace wive
 #else
 namespace wive {
-const KernelTable* avx2_kernels() { return nullptr; }
+const KernelTable<float>* avx2_kernels() { return nullptr; }
 }  // namespace wive
 #endif

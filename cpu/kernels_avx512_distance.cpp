@@ -6,11 +6,11 @@
 #include "slabs.h"
 
 namespace wive {
-static constexpr KernelTable table = make_kernel_table<Avx512ByDistance, FullSlabs>("avx512.distance");
-const KernelTable* avx512_by_distance_kernels() { return &table; }
+static constexpr KernelTable<float> table = make_kernel_table<Avx512ByDistance, FullSlabs>("avx512.distance");
+const KernelTable<float>* avx512_by_distance_kernels() { return &table; }
 }  // namespace wive
 #else
 namespace wive {
-const KernelTable* avx512_by_distance_kernels() { return nullptr; }
+const KernelTable<float>* avx512_by_distance_kernels() { return nullptr; }
 }  // namespace wive
 #endif

@@ -4,8 +4,8 @@
 #include "slabs.h"
 
 namespace wive {
-static constexpr KernelTable stored = make_kernel_table<Scalar, FullSlabs, CompressedSlabs>("scalar");
-static constexpr KernelTable by_distance = make_kernel_table<ScalarByDistance, FullSlabs>("scalar.distance");
-const KernelTable* scalar_kernels() { return &stored; }
-const KernelTable* scalar_by_distance_kernels() { return &by_distance; }
+static constexpr KernelTable<float> stored = make_kernel_table<Scalar, FullSlabs, CompressedSlabs>("scalar");
+static constexpr KernelTable<float> by_distance = make_kernel_table<ScalarByDistance, FullSlabs>("scalar.distance");
+const KernelTable<float>* scalar_kernels() { return &stored; }
+const KernelTable<float>* scalar_by_distance_kernels() { return &by_distance; }
 }  // namespace wive

@@ -3,11 +3,17 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <type_traits>
 
 namespace wive {
 
 inline constexpr int node_width = 8;
 inline constexpr int block_width = 4;
+
+// What a scene's numbers are: vertices, rays, t, u and v. Boxes are float32 in either. In templates: Real, float or double.
+enum class Precision { float32, float64 };
+template <class Real>
+inline constexpr Precision precision_of = std::is_same_v<Real, double> ? Precision::float64 : Precision::float32;
 
 // An inner node: eight rows of eight lanes, one lane a child. Planes are relative to BvhView::center and
 // rounded outwards. Lane i of `order` packs, for each of the eight sign octants o, the slot that comes i-th
@@ -24,23 +30,25 @@ static_assert(sizeof(Node) == 256);
 
 // Four triangles side by side. rows[3 * k + axis] holds vertex k, or v0, v1 - v0, v2 - v0 (fast).
 // Unused lanes hold NaN, which passes no test, and prim -1.
-struct alignas(32) TriangleBlock {
-    float rows[9][block_width];
+template <class Real>
+struct alignas(32) TriangleBlockOf {
+    Real rows[9][block_width];
     std::int32_t prim[block_width];
 
     // Always inlined, as all that kernels call: a copy compiled for one instruction set must not be linked into another.
-    [[gnu::always_inline]] float vertex(int k, int axis, int lane) const { return rows[3 * k + axis][lane]; }  // but in `fast` trees
+    [[gnu::always_inline]] Real vertex(int k, int axis, int lane) const { return rows[3 * k + axis][lane]; }  // but in `fast` trees
     [[gnu::always_inline]] std::int32_t prim_at(int lane) const { return prim[lane]; }
-    [[gnu::always_inline]] const TriangleBlock* next() const { return this + 1; }
+    [[gnu::always_inline]] const TriangleBlockOf* next() const { return this + 1; }
 };
-static_assert(sizeof(TriangleBlock) == 160);
+using TriangleBlock = TriangleBlockOf<float>;
+static_assert(sizeof(TriangleBlock) == 160 && sizeof(TriangleBlockOf<double>) == 320);
 
 // What a tree is stored as: the nodes and blocks above, or those of compressed.h.
 enum class NodeForm { float32, compressed };
 inline constexpr int node_form_count = 2;
 
 // Nodes and blocks stand in one piece of memory, first the nodes, then the blocks, counted in units of 32 bytes:
-// a node is eight units, a block five (compressed: four, and three or four). A child reference holds the unit where the child begins, times eight; a
+// a node is eight units, a block five (compressed: four, and three or four; of doubles ten, whatever the nodes). A child reference holds the unit where the child begins, times eight; a
 // leaf sets leaf_bit and puts its number of blocks, less one, in the low three bits. So one mask and one shift lead
 // to a child of either kind.
 inline constexpr std::size_t unit_bytes = 32;
@@ -80,7 +88,9 @@ struct BvhView {
     }
 };
 
-// Coordinates beyond this are refused: products of two of them must stay finite in float.
-inline constexpr float max_coordinate = 1e18f;
+// Coordinates beyond this are refused: products of two of them must stay finite in float,
+// and boxes are float32 in either precision.
+template <class Real>
+inline constexpr Real max_coordinate = static_cast<Real>(1e18);
 
 }  // namespace wive

@@ -2,15 +2,18 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cmath>
 #include <cstring>
 #include <limits>
 #include <sstream>
 #include <stdexcept>
+#include <type_traits>
 #include <vector>
 
 #include "exact.h"
 #include "layout.h"
 #include "parallel.h"
+#include "planes.h"
 
 namespace wive {
 namespace {
@@ -35,10 +38,11 @@ std::size_t first_bad(std::size_t count, Threads& threads, const HasBad& has_bad
 }
 
 // Whether the three corners don't lie on one line, decided exactly: they do where all three projections have area zero.
-bool has_area(const float* a, const float* b, const float* c) {
+template <class Real>
+bool has_area(const Real* a, const Real* b, const Real* c) {
     for (int k = 0; k < 3; ++k) {
         const int i = (k + 1) % 3, j = (k + 2) % 3;
-        const float p[2] = {a[i], a[j]}, q[2] = {b[i], b[j]}, r[2] = {c[i], c[j]};
+        const Real p[2] = {a[i], a[j]}, q[2] = {b[i], b[j]}, r[2] = {c[i], c[j]};
         if (orientation(p, q, r) != 0) return true;
     }
     return false;
@@ -58,8 +62,20 @@ bool surely_has_area(Float4v a, Float4v b, Float4v c) {
     return (sure[0] | sure[1] | sure[2]) != 0;
 }
 
+bool surely_has_area(const double* a, const double* b, const double* c) {
+    constexpr double error = 4 * std::numeric_limits<double>::epsilon(), underflow = 4 * std::numeric_limits<double>::min();
+    const double u[3] = {b[0] - a[0], b[1] - a[1], b[2] - a[2]}, v[3] = {c[0] - a[0], c[1] - a[1], c[2] - a[2]};
+    bool sure = false;
+    for (int k = 0; k < 3; ++k) {
+        const int i = (k + 1) % 3, j = (k + 2) % 3;
+        const double left = u[i] * v[j], right = u[j] * v[i];
+        sure |= std::abs(left - right) > error * (std::abs(left) + std::abs(right)) + underflow;
+    }
+    return sure;
+}
+
 // A vertex, with a zero in the fourth lane.
-Float4v load_vertex(const Mesh& mesh, std::int32_t index) {
+Float4v load_vertex(const Mesh<float>& mesh, std::int32_t index) {
     const float* v = mesh.vertices + 3 * static_cast<std::size_t>(index);
     if (static_cast<std::size_t>(index) + 1 == mesh.vertex_count) return Float4v{v[0], v[1], v[2], 0};
     Int4v bits;
@@ -70,20 +86,22 @@ Float4v load_vertex(const Mesh& mesh, std::int32_t index) {
 
 }  // namespace
 
-void check_mesh(const Mesh& mesh, Threads& threads) {
+template <class Real>
+void check_mesh(const Mesh<Real>& mesh, Threads& threads) {
     if (mesh.vertex_count > std::numeric_limits<std::int32_t>::max())
         throw std::invalid_argument("vertices: expected at most 2147483647, split the mesh into several scenes");
     // Without a branch, so that compilers take several at a time. Bits of magnitudes compare as the magnitudes do,
     // those of infinities and NaNs above all others.
     const auto bad_vertices = [&](std::size_t begin, std::size_t end) {
-        std::int32_t bad = 0;
-        for (std::size_t i = 3 * begin; i < 3 * end; ++i)
-            bad |= std::bit_cast<std::int32_t>(max_coordinate) - (std::bit_cast<std::int32_t>(mesh.vertices[i]) & 0x7fffffff);
+        using Bits = std::conditional_t<sizeof(Real) == sizeof(float), std::int32_t, std::int64_t>;
+        constexpr Bits largest = std::bit_cast<Bits>(max_coordinate<Real>), magnitude = std::numeric_limits<Bits>::max();
+        Bits bad = 0;
+        for (std::size_t i = 3 * begin; i < 3 * end; ++i) bad |= largest - (std::bit_cast<Bits>(mesh.vertices[i]) & magnitude);
         return bad < 0;
     };
     const auto bad_vertex = [&](std::size_t i) { return bad_vertices(i, i + 1); };
     if (const std::size_t i = first_bad(mesh.vertex_count, threads, bad_vertices, bad_vertex); i < mesh.vertex_count) {
-        const float* v = mesh.vertices + 3 * i;
+        const Real* v = mesh.vertices + 3 * i;
         std::ostringstream text;
         text << "vertices[" << i << "] = (" << v[0] << ", " << v[1] << ", " << v[2]
              << "): expected finite coordinates of at most 1e18 in magnitude; remove or repair this vertex";
@@ -108,7 +126,10 @@ void check_mesh(const Mesh& mesh, Threads& threads) {
     }
 }
 
-bool box_triangle(const Mesh& mesh, std::size_t face, Box& box) {
+template void check_mesh(const Mesh<float>&, Threads&);
+template void check_mesh(const Mesh<double>&, Threads&);
+
+bool box_triangle(const Mesh<float>& mesh, const Point&, std::size_t face, Box& box) {
     const std::int32_t* corners = mesh.faces + 3 * face;
     const Float4v a = load_vertex(mesh, corners[0]), b = load_vertex(mesh, corners[1]),
                   c = load_vertex(mesh, corners[2]);
@@ -116,7 +137,43 @@ bool box_triangle(const Mesh& mesh, std::size_t face, Box& box) {
     return surely_has_area(a, b, c) || has_area(mesh.corner(face, 0), mesh.corner(face, 1), mesh.corner(face, 2));
 }
 
-PrimRefs make_prim_refs(const Mesh& mesh, Threads& threads) {
+bool box_triangle(const Mesh<double>& mesh, const Point& center, std::size_t face, Box& box) {
+    const double *a = mesh.corner(face, 0), *b = mesh.corner(face, 1), *c = mesh.corner(face, 2);
+    box.lo[3] = box.hi[3] = 0;
+    for (int axis = 0; axis < 3; ++axis) {
+        const float origin = center[static_cast<std::size_t>(axis)];
+        box.lo[axis] = plane_below(std::min({a[axis], b[axis], c[axis]}), origin);
+        box.hi[axis] = plane_above(std::max({a[axis], b[axis], c[axis]}), origin);
+    }
+    return surely_has_area(a, b, c) || has_area(a, b, c);
+}
+
+Bounds find_bounds(const Mesh<double>& mesh, Threads& threads) {
+    constexpr double infinity = std::numeric_limits<double>::infinity();
+    constexpr Bounds none = {{{infinity, infinity, infinity}, {-infinity, -infinity, -infinity}}};
+    const auto grow = [](Bounds& bounds, const double* low, const double* high) {
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+            bounds[0][axis] = std::min(bounds[0][axis], low[axis]);
+            bounds[1][axis] = std::max(bounds[1][axis], high[axis]);
+        }
+    };
+    std::vector<Bounds> parts((mesh.face_count + chunk_size - 1) / chunk_size, none);
+    parallel_chunks(mesh.face_count, chunk_size, threads, [&](std::size_t begin, std::size_t end) {
+        Bounds part = none;
+        for (std::size_t face = begin; face < end; ++face) {
+            const double *a = mesh.corner(face, 0), *b = mesh.corner(face, 1), *c = mesh.corner(face, 2);
+            if (!surely_has_area(a, b, c) && !has_area(a, b, c)) continue;
+            for (const double* corner : {a, b, c}) grow(part, corner, corner);
+        }
+        parts[begin / chunk_size] = part;
+    });
+    Bounds all = none;
+    for (const Bounds& part : parts) grow(all, part[0].data(), part[1].data());
+    return all;
+}
+
+template <class Real>
+PrimRefs make_prim_refs(const Mesh<Real>& mesh, const Point& center, Threads& threads) {
     PrimRefs all;
     all.refs = LargeArray<PrimRef>(mesh.face_count);
     const std::size_t chunks = (mesh.face_count + chunk_size - 1) / chunk_size;
@@ -130,7 +187,7 @@ PrimRefs make_prim_refs(const Mesh& mesh, Threads& threads) {
         Part part;
         for (std::size_t face = begin; face < end; ++face) {
             Box box;
-            if (!box_triangle(mesh, face, box)) continue;
+            if (!box_triangle(mesh, center, face, box)) continue;
             part.box.grow(box);
             part.centroids.grow(box.lo + box.hi);
             PrimRef ref = {box.lo, box.hi};
@@ -151,5 +208,8 @@ PrimRefs make_prim_refs(const Mesh& mesh, Threads& threads) {
     all.count = static_cast<std::uint32_t>(count);
     return all;
 }
+
+template PrimRefs make_prim_refs(const Mesh<float>&, const Point&, Threads&);
+template PrimRefs make_prim_refs(const Mesh<double>&, const Point&, Threads&);
 
 }  // namespace wive

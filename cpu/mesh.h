@@ -1,6 +1,7 @@
 // The caller's triangles: checked once, then boxed for the builder.
 #pragma once
 
+#include <array>
 #include <bit>
 #include <cstddef>
 #include <cstdint>
@@ -11,13 +12,14 @@
 
 namespace wive {
 
+template <class Real>
 struct Mesh {
-    const float* vertices;  // (vertex_count, 3)
+    const Real* vertices;   // (vertex_count, 3)
     std::size_t vertex_count;
     const std::int32_t* faces;  // (face_count, 3)
     std::size_t face_count;
 
-    const float* corner(std::size_t face, int k) const {
+    const Real* corner(std::size_t face, int k) const {
         return vertices + 3 * static_cast<std::size_t>(faces[3 * face + static_cast<std::size_t>(k)]);
     }
 };
@@ -37,10 +39,21 @@ struct PrimRef {
 
 // Throws std::invalid_argument naming the first vertex that is not a usable number, or the first face that
 // points outside the vertices.
-void check_mesh(const Mesh& mesh, Threads& threads);
+template <class Real>
+void check_mesh(const Mesh<Real>& mesh, Threads& threads);
 
-// The box of a triangle; false where it has no area, decided exactly.
-bool box_triangle(const Mesh& mesh, std::size_t face, Box& box);
+using Point = std::array<float, 3>;
+
+// The box of a triangle; false where it has no area, decided exactly. In float32, boxes are in the mesh's coordinates
+// whatever the tree's centre, and nodes store them relative to it later; in float64 they are relative to it from here on.
+bool box_triangle(const Mesh<float>& mesh, const Point& center, std::size_t face, Box& box);
+bool box_triangle(const Mesh<double>& mesh, const Point& center, std::size_t face, Box& box);
+
+// The lowest and the highest corner; infinity and minus infinity without any triangle.
+using Bounds = std::array<std::array<double, 3>, 2>;
+
+// Of the triangles with an area.
+Bounds find_bounds(const Mesh<double>& mesh, Threads& threads);
 
 struct PrimRefs {
     LargeArray<PrimRef> refs;
@@ -49,6 +62,7 @@ struct PrimRefs {
 };
 
 // One reference for each triangle with an area; zero-area triangles can't be hit and are left out.
-PrimRefs make_prim_refs(const Mesh& mesh, Threads& threads);
+template <class Real>
+PrimRefs make_prim_refs(const Mesh<Real>& mesh, const Point& center, Threads& threads);
 
 }  // namespace wive

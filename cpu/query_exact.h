@@ -15,7 +15,7 @@ struct ExactClosestHit {
     static constexpr bool crossings = false;
     static constexpr bool wants_uv = true;
 
-    float tmin, tmax;  // for the boxes, in the frame's units; tmax shrinks to the best hit
+    Interval<float> interval{};  // for the boxes, in the frame's units; ends at the best hit
     HitNumbers best{};
     std::uint32_t prim = no_prim;
     const Block* block = nullptr;
@@ -39,10 +39,10 @@ struct ExactClosestHit {
         block = &hit_block;
         lane = hit_lane;
         // Boxes are lowered by more than t was rounded (frame.h), except where t is a subnormal number.
-        tmax = (hit.t + 0x1p-148f) * unscale;
+        interval.end_at((hit.t + 0x1p-148f) * unscale);
         return false;
     }
-    [[gnu::always_inline]] void write(const HitBatch& hits, std::size_t i, float) const {
+    [[gnu::always_inline]] void write(const HitBatch<float>& hits, std::size_t i, float) const {
         const bool hit = prim != no_prim;
         constexpr float nan = std::numeric_limits<float>::quiet_NaN();
         hits.t[i] = hit ? best.t : std::numeric_limits<float>::infinity();

@@ -16,18 +16,23 @@ namespace {
 constexpr std::size_t task_count = 256;  // subtrees to hand out, whatever the threads
 constexpr std::size_t chunk_size = 1 << 12;
 
-// Boxes of every lane in the mesh's own coordinates; how nodes store them comes after.
+// Boxes of every lane as box_triangle has them; how nodes store them comes after.
+template <class Real>
 class BoxFitter {
+    using Block = TriangleBlockOf<Real>;
+    using Form = Float32Form<Real>;
+
 public:
-    BoxFitter(const BvhView& from, std::size_t node_count, std::byte* to, const Mesh& mesh, Accuracy accuracy)
-        : from_(from), to_(to), mesh_(mesh), accuracy_(accuracy), boxes_(node_width * node_count) {}
+    BoxFitter(const BvhView& from, std::size_t node_count, std::byte* to, const Mesh<Real>& mesh, const Point& center,
+              Accuracy accuracy)
+        : from_(from), to_(to), mesh_(mesh), center_(center), accuracy_(accuracy), boxes_(node_width * node_count) {}
 
     // Also writes the leaves.
     void fit(Threads& threads) {
         std::vector<std::uint32_t> nodes = {inner_child(0)};  // breadth first; those before `top` wait for the others
         std::size_t top = 0;
         for (; top < nodes.size() && nodes.size() - top < task_count; ++top)
-            for (const std::uint32_t child : from_.node<Float32Form>(nodes[top]).child)
+            for (const std::uint32_t child : from_.template node<Form>(nodes[top]).child)
                 if (child != unused && is_inner(child)) nodes.push_back(child);
         std::vector<std::size_t> counts(nodes.size());
         parallel_for(nodes.size() - top, threads, [&](std::size_t i) { fit_subtree(nodes[top + i], counts[top + i]); });
@@ -52,7 +57,7 @@ private:
 
     template <class BoxOfInner>
     void fit_node(std::uint32_t node, std::size_t& count, const BoxOfInner& box_of_inner) {
-        const Node& old = from_.node<Float32Form>(node);
+        const Node& old = from_.template node<Form>(node);
         Box* boxes = boxes_.data() + node_width * index_of(node);
         for (int lane = 0; lane < node_width; ++lane) {
             const std::uint32_t child = old.child[lane];
@@ -70,8 +75,8 @@ private:
 
     // Triangles that have lost their area leave the leaf.
     Box fit_leaf(std::uint32_t leaf, std::size_t& count) {
-        const TriangleBlock* old = from_.leaf<Float32Form>(leaf);
-        TriangleBlock* block = reinterpret_cast<TriangleBlock*>(to_ + child_offset(leaf));
+        const Block* old = from_.template leaf<Form>(leaf);
+        Block* block = reinterpret_cast<Block*>(to_ + child_offset(leaf));
         Box all;
         for (std::uint32_t i = 0; i < leaf_block_count(leaf); ++i) {
             clear_block(block[i]);
@@ -79,7 +84,7 @@ private:
                 Box box;
                 if (old[i].prim[lane] < 0) continue;
                 const std::uint32_t prim = static_cast<std::uint32_t>(old[i].prim[lane]);
-                if (!box_triangle(mesh_, prim, box)) continue;
+                if (!box_triangle(mesh_, center_, prim, box)) continue;
                 write_triangle(block[i], lane, mesh_, prim, accuracy_);
                 all.grow(box);
                 ++count;
@@ -90,60 +95,75 @@ private:
 
     const BvhView& from_;
     std::byte* to_;
-    const Mesh& mesh_;
+    const Mesh<Real>& mesh_;
+    const Point& center_;
     Accuracy accuracy_;
     LargeArray<Box> boxes_;
     std::size_t triangle_count_ = 0;
 };
 
-std::span<const TriangleBlock> blocks_of(const Bvh& bvh) {
+template <class Real>
+std::span<const TriangleBlockOf<Real>> blocks_of(const Bvh& bvh) {
+    using Block = TriangleBlockOf<Real>;
     const std::span<const std::byte> bytes = bvh.blocks();
-    return {reinterpret_cast<const TriangleBlock*>(bytes.data()), bytes.size() / sizeof(TriangleBlock)};
+    return {reinterpret_cast<const Block*>(bytes.data()), bytes.size() / sizeof(Block)};
 }
 
 // Whether a triangle that is in no leaf has an area.
-bool is_one_missing(std::span<const TriangleBlock> blocks, const Mesh& mesh, Threads& threads) {
+template <class Real>
+bool is_one_missing(std::span<const TriangleBlockOf<Real>> blocks, const Mesh<Real>& mesh, Threads& threads) {
     std::vector<char> present(mesh.face_count);
-    for (const TriangleBlock& block : blocks)
+    for (const auto& block : blocks)
         for (const std::int32_t prim : block.prim)
             if (prim >= 0) present[static_cast<std::size_t>(prim)] = 1;
     std::atomic<bool> missing = false;
     parallel_chunks(mesh.face_count, chunk_size, threads, [&](std::size_t begin, std::size_t end) {
         Box box;
         for (std::size_t i = begin; i < end; ++i)
-            if (!present[i] && box_triangle(mesh, i, box)) missing = true;
+            if (!present[i] && box_triangle(mesh, {}, i, box)) missing = true;
     });
     return missing;
 }
 
 }  // namespace
 
-std::unique_ptr<Bvh> Bvh::refitted(const Mesh& mesh, unsigned asked_threads) const {
+template <class Real>
+std::unique_ptr<Bvh> Bvh::refitted(const Mesh<Real>& mesh, unsigned asked_threads) const {
     if (form_ != NodeForm::float32) return nullptr;
     Threads threads(thread_count(asked_threads));
     check_mesh(mesh, threads);
-    if (triangle_count_ < mesh.face_count && is_one_missing(blocks_of(*this), mesh, threads)) return nullptr;
+    if (triangle_count_ < mesh.face_count && is_one_missing(blocks_of<Real>(*this), mesh, threads)) return nullptr;
     std::unique_ptr<Bvh> bvh(new Bvh);
     bvh->units_ = LargeArray<std::byte>(units_.size());
     bvh->node_count_ = node_count_;
     bvh->accuracy_ = accuracy_;
+    bvh->precision_ = precision_;
     bvh->depth_ = depth_;
     const BvhView from = view();
-    BoxFitter fitter(from, node_count_, bvh->units_.data(), mesh, accuracy_);
+    constexpr bool doubles = precision_of<Real> == Precision::float64;
+    if constexpr (doubles) bvh->set_center(find_bounds(mesh, threads));
+    BoxFitter<Real> fitter(from, node_count_, bvh->units_.data(), mesh, bvh->center_, accuracy_);
     fitter.fit(threads);
     bvh->triangle_count_ = fitter.triangle_count();
-    bvh->set_bounds(fitter.all());
+    if constexpr (doubles)
+        bvh->set_extent(fitter.all());
+    else
+        bvh->set_bounds(fitter.all());
+    const Point still_to_center = doubles ? Point{} : bvh->center_;
     const Node* old_nodes = reinterpret_cast<const Node*>(units_.data());
     Node* to = reinterpret_cast<Node*>(bvh->units_.data());
     parallel_chunks(node_count_, chunk_size, threads, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) {
             const Node& old = old_nodes[i];
-            for (int lane = 0; lane < node_width; ++lane) write_box(to[i], lane, fitter.boxes(i)[lane], bvh->center_);
+            for (int lane = 0; lane < node_width; ++lane) write_box(to[i], lane, fitter.boxes(i)[lane], still_to_center);
             std::memcpy(to[i].child, old.child, sizeof old.child);
             std::memcpy(to[i].order, old.order, sizeof old.order);
         }
     });
     return bvh;
 }
+
+template std::unique_ptr<Bvh> Bvh::refitted(const Mesh<float>&, unsigned) const;
+template std::unique_ptr<Bvh> Bvh::refitted(const Mesh<double>&, unsigned) const;
 
 }  // namespace wive

@@ -117,11 +117,11 @@ private:
                            prim_.data(), uv_.data());
             return;
         }
-        HitBatch hits;
+        HitBatch<float> hits;
         hits.t = t_.data();
         hits.prim = prim_.data();
         hits.uv = uv_.data();
-        wive::trace(job_.kernels, job_.kernels.find({QueryKind::closest, job_.accuracy, job_.nodes, false}), job_.bvh,
+        wive::trace<float>(job_.kernels, job_.kernels.find({QueryKind::closest, job_.accuracy, job_.nodes, false}), job_.bvh,
                     {origins_.data(), directions_.data(), &zero, &infinity, 0, 0}, hits, paths_.size(), 1, job_.in_flight);
     }
 

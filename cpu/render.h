@@ -27,8 +27,8 @@ struct ForeignTracer {
 
 struct RenderJob {
     BvhView bvh;
-    Mesh mesh;
-    const KernelTable& kernels;  // the only thing that differs between instruction sets
+    Mesh<float> mesh;
+    const KernelTable<float>& kernels;  // the only thing that differs between instruction sets
     Accuracy accuracy;
     NodeForm nodes;
     Camera camera;

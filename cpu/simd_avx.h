@@ -12,9 +12,15 @@
 
 namespace wive {
 
+struct SseFloat4;
+
 struct AvxDouble4 {
     __m256d v;
 
+    WIVE_INLINE static AvxDouble4 load(const double* p) { return {_mm256_load_pd(p)}; }
+    WIVE_INLINE static AvxDouble4 set(double x, double y, double z, double w) { return {_mm256_setr_pd(x, y, z, w)}; }
+    WIVE_INLINE static AvxDouble4 of(SseFloat4 a);
+    WIVE_INLINE void store(double* p) const { _mm256_store_pd(p, v); }
     WIVE_INLINE static AvxDouble4 all(double x) { return {_mm256_set1_pd(x)}; }
     WIVE_INLINE friend AvxDouble4 operator+(AvxDouble4 a, AvxDouble4 b) { return {_mm256_add_pd(a.v, b.v)}; }
     WIVE_INLINE friend AvxDouble4 operator-(AvxDouble4 a, AvxDouble4 b) { return {_mm256_sub_pd(a.v, b.v)}; }
@@ -28,6 +34,25 @@ struct AvxDouble4 {
     }
     WIVE_INLINE friend unsigned less_equal(AvxDouble4 a, AvxDouble4 b) {
         return static_cast<unsigned>(_mm256_movemask_pd(_mm256_cmp_pd(a.v, b.v, _CMP_LE_OQ)));
+    }
+    // These as for SseFloat4.
+    WIVE_INLINE friend double highest_lane(AvxDouble4 a) {
+        const __m128d pairs = _mm_max_pd(_mm256_castpd256_pd128(a.v), _mm256_extractf128_pd(a.v, 1));
+        return _mm_cvtsd_f64(_mm_max_sd(pairs, _mm_unpackhi_pd(pairs, pairs)));
+    }
+    WIVE_INLINE friend unsigned all_in_order(AvxDouble4 a, AvxDouble4 b, AvxDouble4 c, AvxDouble4 d, AvxDouble4 e,
+                                             AvxDouble4 f) {
+        const __m256d ab = _mm256_cmp_pd(a.v, b.v, _CMP_LE_OQ), cd = _mm256_cmp_pd(c.v, d.v, _CMP_LE_OQ);
+        return static_cast<unsigned>(
+            _mm256_movemask_pd(_mm256_and_pd(_mm256_and_pd(ab, cd), _mm256_cmp_pd(e.v, f.v, _CMP_LT_OQ))));
+    }
+    WIVE_INLINE friend unsigned equal(AvxDouble4 a, AvxDouble4 b) {
+        return static_cast<unsigned>(_mm256_movemask_pd(_mm256_cmp_pd(a.v, b.v, _CMP_EQ_OQ)));
+    }
+    WIVE_INLINE friend unsigned one_sided(AvxDouble4 low, AvxDouble4 high) {
+        const __m256d zero = _mm256_setzero_pd();
+        return static_cast<unsigned>(_mm256_movemask_pd(
+            _mm256_or_pd(_mm256_cmp_pd(low.v, zero, _CMP_GE_OQ), _mm256_cmp_pd(high.v, zero, _CMP_LE_OQ))));
     }
 };
 
@@ -50,7 +75,10 @@ struct SseFloat4 {
         return {_mm_xor_ps(a.v, _mm_and_ps(_mm_set1_ps(-0.0f), s.v))};
     }
     WIVE_INLINE friend AvxDouble4 widen(SseFloat4 a) { return {_mm256_cvtps_pd(a.v)}; }
+    // From either precision: to float, and to this one.
     WIVE_INLINE static SseFloat4 narrow(AvxDouble4 a) { return {_mm256_cvtpd_ps(a.v)}; }
+    WIVE_INLINE static SseFloat4 narrow(SseFloat4 a) { return a; }
+    WIVE_INLINE static SseFloat4 of(SseFloat4 a) { return a; }
     WIVE_INLINE friend float highest_lane(SseFloat4 a) {
         const __m128 pairs = _mm_max_ps(a.v, _mm_movehl_ps(a.v, a.v));
         return _mm_cvtss_f32(_mm_max_ss(pairs, _mm_movehdup_ps(pairs)));
@@ -75,6 +103,8 @@ struct SseFloat4 {
             _mm_or_ps(_mm_cmp_ps(low.v, zero, _CMP_GE_OQ), _mm_cmp_ps(high.v, zero, _CMP_LE_OQ))));
     }
 };
+
+WIVE_INLINE AvxDouble4 AvxDouble4::of(SseFloat4 a) { return widen(a); }
 
 // Which of eight lanes were hit, as a vector of all-ones and all-zeros.
 struct AvxHits {

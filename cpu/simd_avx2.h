@@ -18,6 +18,8 @@ inline constexpr std::array<std::uint32_t, 256> compress_table = [] {
 }();
 
 struct Avx2 {
+    using Real = float;
+    using Real4 = SseFloat4;
     using Float4 = SseFloat4;
     using Double4 = AvxDouble4;
 

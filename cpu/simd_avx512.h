@@ -7,6 +7,8 @@
 namespace wive {
 
 struct Avx512 {
+    using Real = float;
+    using Real4 = SseFloat4;
     using Float4 = SseFloat4;
     using Double4 = AvxDouble4;
 

@@ -92,7 +92,11 @@ struct ScalarLanes {
     WIVE_INLINE friend ScalarLanes<double, width> widen(ScalarLanes a) {
         return ScalarLanes<double, width>::each([&](int i) { return static_cast<double>(a.v[i]); });
     }
-    WIVE_INLINE static ScalarLanes narrow(ScalarLanes<double, width> a) {
+    // From either precision: to float, and to this one.
+    WIVE_INLINE static ScalarLanes narrow(const auto& a) {
+        return each([&](int i) { return static_cast<Number>(a.v[i]); });
+    }
+    WIVE_INLINE static ScalarLanes of(const ScalarLanes<float, width>& a) {
         return each([&](int i) { return static_cast<Number>(a.v[i]); });
     }
     WIVE_INLINE friend unsigned one_sided(ScalarLanes low, ScalarLanes high) {
@@ -118,6 +122,8 @@ WIVE_INLINE ScalarHits with_child(ScalarHits hits, const std::uint32_t* child) {
 }
 
 struct Scalar {
+    using Real = float;
+    using Real4 = ScalarLanes<float, 4>;
     using Float4 = ScalarLanes<float, 4>;
     using Double4 = ScalarLanes<double, 4>;
     using Float8 = ScalarLanes<float, 8>;

@@ -14,13 +14,14 @@ struct Entries {
     typename Isa::Hits hit;
 };
 
-// The nodes and blocks that were not compressed, and the cache lines of a node.
+// The nodes and blocks that were not compressed, and the cache lines of a node, or of a block of doubles.
+template <class Real>
 struct Float32Form {
     using Node = wive::Node;
-    using Block = TriangleBlock;
+    using Block = TriangleBlockOf<Real>;
     template <class Isa>
     using Corners = StoredCorners<Isa>;
-    static constexpr unsigned prefetched_lines = 4;
+    static constexpr unsigned prefetched_lines = sizeof(Real) == sizeof(float) ? 4 : 5;
 };
 
 [[gnu::always_inline]] inline const float* row(const Node& node, std::size_t plane) {
@@ -30,14 +31,14 @@ struct Float32Form {
 // The paper's full form: entry and exit distances in two registers of eight lanes.
 template <class Isa>
 struct FullSlabs {
-    using Form = Float32Form;
+    using Form = Float32Form<typename Isa::Real>;
     using Float8 = typename Isa::Float8;
 
     Float8 rdir[3], near_bias[3], far_bias[3], tmin;
     std::size_t near_row[3], far_row[3];  // in planes from the node's first
     unsigned order_shift;
 
-    [[gnu::always_inline]] explicit FullSlabs(const RayFrame<Isa>& ray) : tmin(Float8::all(ray.tmin)) {
+    [[gnu::always_inline]] explicit FullSlabs(const RayFrame<Isa>& ray) : tmin(Float8::all(ray.interval.entry())) {
         for (unsigned axis = 0; axis < 3; ++axis) {
             rdir[axis] = Float8::all(ray.rdir[axis]);
             near_bias[axis] = Float8::all(ray.near_bias[axis]);

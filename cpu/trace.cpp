@@ -23,8 +23,9 @@ unsigned worker_count(std::size_t count, unsigned threads) {
     return runs <= 1 ? 1 : static_cast<unsigned>(std::min<std::size_t>(runs, thread_count(threads)));
 }
 
-void trace(const KernelTable& table, TraceBatch kernel, const BvhView& bvh, const RayBatch& rays, const HitBatch& hits,
-           std::size_t count, unsigned threads, unsigned in_flight) {
+template <class Real>
+void trace(const KernelTable<Real>& table, TraceBatch<Real> kernel, const BvhView& bvh, const RayBatch<Real>& rays,
+           const HitBatch<Real>& hits, std::size_t count, unsigned threads, unsigned in_flight) {
     if (in_flight == 0) in_flight = count < fewest_in_flight ? 1 : usual_in_flight;
     in_flight = std::min<unsigned>(in_flight, max_in_flight);
     in_flight = static_cast<unsigned>(std::min<std::size_t>(in_flight, count));
@@ -32,12 +33,17 @@ void trace(const KernelTable& table, TraceBatch kernel, const BvhView& bvh, cons
     const RaySource source = {&next, count, rays_per_run};
     const auto work = [&](std::size_t worker) {
         LargeArray<std::byte> scratch(in_flight > 1 ? in_flight * table.flight_bytes : 0);
-        HitBatch own = hits;
+        HitBatch<Real> own = hits;
         if (own.found) own.found += worker;
         kernel(bvh, rays, own, source, in_flight, scratch.data());
     };
     const unsigned workers = worker_count(count, threads);
     parallel_for(workers, workers, work);
 }
+
+template void trace(const KernelTable<float>&, TraceBatch<float>, const BvhView&, const RayBatch<float>&,
+                    const HitBatch<float>&, std::size_t, unsigned, unsigned);
+template void trace(const KernelTable<double>&, TraceBatch<double>, const BvhView&, const RayBatch<double>&,
+                    const HitBatch<double>&, std::size_t, unsigned, unsigned);
 
 }  // namespace wive

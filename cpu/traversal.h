@@ -18,7 +18,7 @@ struct NoCounters {
     [[gnu::always_inline]] void inner_node() {}
     [[gnu::always_inline]] void leaf() {}
     [[gnu::always_inline]] void block(const auto&) {}
-    [[gnu::always_inline]] void write(const HitBatch&, std::size_t) const {}
+    [[gnu::always_inline]] void write(const auto&, std::size_t) const {}
 };
 
 struct StepCounters {
@@ -29,7 +29,7 @@ struct StepCounters {
     [[gnu::always_inline]] void block(const auto& block) {
         for (int lane = 0; lane < block_width; ++lane) triangles += block.prim_at(lane) >= 0;
     }
-    [[gnu::always_inline]] void write(const HitBatch& hits, std::size_t i) const {
+    [[gnu::always_inline]] void write(const auto& hits, std::size_t i) const {
         hits.stats[3 * i] = inner_nodes;
         hits.stats[3 * i + 1] = leaves;
         hits.stats[3 * i + 2] = triangles;
@@ -100,11 +100,11 @@ template <bool in_order, class Isa, template <class> class Slabs>
 
 // What ray i asks, before anything is found. Only the query for every hit knows whose hits they are.
 template <class Query, class Isa>
-[[gnu::always_inline]] inline Query query_of(const RayFrame<Isa>& ray, const HitBatch& hits, std::size_t i) {
+[[gnu::always_inline]] inline Query query_of(const RayFrame<Isa>& ray, const HitBatch<typename Isa::Real>& hits, std::size_t i) {
     if constexpr (requires { &Query::found; })
-        return {.tmin = ray.tmin, .tmax = ray.tmax, .scale = ray.scale, .ray = i, .found = hits.found};
+        return {.interval = ray.interval, .scale = ray.scale, .ray = i, .found = hits.found};
     else
-        return {ray.tmin, ray.tmax};
+        return {ray.interval};
 }
 
 // Comes with what is asked in `result` and leaves the answer there; meanwhile it is in registers.
@@ -125,12 +125,12 @@ template <class Isa, template <class> class Slabs, template <class> class Triang
     // Children that have come to lie behind the best hit are passed over.
     const auto skip_hidden = [&] {
         if constexpr (Query::in_order)
-            while (top.distance() > query.tmax) take_next();
+            while (top.distance() > query.interval.reach()) take_next();
     };
     for (;;) {
         while (is_inner(child)) {
             counters.inner_node();
-            child = visit_and_take<Query::in_order>(bvh, bvh.template node<Form>(child), slabs, query.tmax, top);
+            child = visit_and_take<Query::in_order>(bvh, bvh.template node<Form>(child), slabs, query.interval.reach(), top);
             skip_hidden();
         }
         if (child == end_of_stack) break;
@@ -147,11 +147,12 @@ template <class Isa, template <class> class Slabs, template <class> class Triang
 }
 
 template <class Isa, template <class> class Slabs, template <class> class Triangles, class Query, class Counters>
-void trace_one_by_one(const BvhView& bvh, const RayBatch& rays, const HitBatch& hits, const RaySource& source) {
+void trace_one_by_one(const BvhView& bvh, const RayBatch<typename Isa::Real>& rays,
+                      const HitBatch<typename Isa::Real>& hits, const RaySource& source) {
     for (std::size_t begin, end; source.take(begin, end);)
         for (std::size_t i = begin; i < end; ++i) {
             typename Triangles<Isa>::Frame ray;
-            Query query{0, 0};
+            Query query{};
             Counters counters;
             ray.scale = 1;
             if (ray.load(bvh, rays, i)) {

@@ -22,7 +22,7 @@ struct ExactFrame : AxisFrame<Isa> {
     double inverse;    // 1 / the direction on the longest axis
     double bound;      // no weight in the whole tree is off by more
 
-    [[gnu::always_inline]] bool load(const BvhView& bvh, const RayBatch& rays, std::size_t i) {
+    [[gnu::always_inline]] bool load(const BvhView& bvh, const RayBatch<float>& rays, std::size_t i) {
         if (!AxisFrame<Isa>::load(bvh, rays, i)) [[unlikely]] return false;
         using Float4 = typename Isa::Float4;
         const auto& axis = this->axis;

@@ -5,29 +5,38 @@
 // the mesh stays closed. The edge functions then have the exact sign of the rounded corners: a difference of two
 // rounded products that is not zero has the sign of the exact one, because rounding is monotonic, and where it is
 // zero the products are taken again in double, where they are exact. Fused multiply-adds would break that symmetry.
+// Scenes of doubles have the same test in double, u = 2^-53, and triangle_watertight_float64.h for what follows.
 #pragma once
 
 #include <cmath>
 
 #include "frame.h"
 #include "layout.h"
+#include "triangle_watertight_float64.h"
 
 namespace wive {
 
 // What the test needs of a ray besides: the shear that makes it the z axis.
 template <class Isa>
 struct WatertightFrame : AxisFrame<Isa> {
-    float shear[2];
+    using Real = typename Isa::Real;
+    Real shear[2];
 
-    [[gnu::always_inline]] bool load(const BvhView& bvh, const RayBatch& rays, std::size_t i) {
+    [[gnu::always_inline]] bool load(const BvhView& bvh, const RayBatch<Real>& rays, std::size_t i) {
         if (!AxisFrame<Isa>::load(bvh, rays, i)) [[unlikely]] return false;
-        for (int k = 0; k < 2; ++k) shear[k] = this->direction[this->axis[k]] / this->direction[this->axis[2]];
+        for (int k = 0; k < 2; ++k) {
+            shear[k] = this->direction[this->axis[k]] / this->direction[this->axis[2]];
+            // Smaller slopes move nothing by as much as rounding does; without them no product underflows.
+            if constexpr (sizeof(Real) == sizeof(double)) shear[k] = std::fabs(shear[k]) < 0x1p-100 ? 0.0 : shear[k];
+        }
         return true;
     }
 };
 
 template <class Isa>
 class WatertightTriangles {
+    using Real = typename Isa::Real;
+    using Real4 = typename Isa::Real4;
     using Float4 = typename Isa::Float4;
     using Double4 = typename Isa::Double4;
 
@@ -37,32 +46,46 @@ public:
     [[gnu::always_inline]] explicit WatertightTriangles(const Frame& ray) : ray_(ray) {
         for (int k = 0; k < 3; ++k) axis_[k] = ray.axis[k];
         for (int k = 0; k < 2; ++k) shear_[k] = ray.shear[k];
-        for (int k = 0; k < 3; ++k) origin_[k] = Float4::all(ray.origin[axis_[k]]);
+        for (int k = 0; k < 3; ++k) origin_[k] = Real4::all(ray.origin[axis_[k]]);
     }
 
     // Offers every hit of the block to the query; true once the query is done.
     template <class Corners, class Query>
     [[gnu::always_inline]] bool test(const Corners& corners, Query& query) const {
-        Float4 x[3], y[3];
-        const Float4 shear_x = Float4::all(shear_[0]), shear_y = Float4::all(shear_[1]);
+        Real4 x[3], y[3], z[3];
+        const Real4 shear_x = Real4::all(shear_[0]), shear_y = Real4::all(shear_[1]);
         for (unsigned k = 0; k < 3; ++k) {
-            const Float4 z = corners.vertex(k, axis_[2]) - origin_[2];
-            x[k] = (corners.vertex(k, axis_[0]) - origin_[0]) - shear_x * z;
-            y[k] = (corners.vertex(k, axis_[1]) - origin_[1]) - shear_y * z;
+            z[k] = corners.vertex(k, axis_[2]) - origin_[2];
+            x[k] = (corners.vertex(k, axis_[0]) - origin_[0]) - shear_x * z[k];
+            y[k] = (corners.vertex(k, axis_[1]) - origin_[1]) - shear_y * z[k];
         }
-        const Float4 u = x[2] * y[1] - y[2] * x[1];
-        const Float4 v = x[0] * y[2] - y[0] * x[2];
-        const Float4 w = x[1] * y[0] - y[1] * x[0];
-        const Float4 low = min(min(u, v), w), high = max(max(u, v), w), zero = Float4::all(0.0f);
+        const Real4 u = x[2] * y[1] - y[2] * x[1];
+        const Real4 v = x[0] * y[2] - y[0] * x[2];
+        const Real4 w = x[1] * y[0] - y[1] * x[0];
+        const Real4 low = min(min(u, v), w), high = max(max(u, v), w), zero = Real4::all(0);
         unsigned lanes = corners.used(one_sided(low, high));
         if (lanes == 0) [[likely]] return false;
 
-        Float4 side = low + zero;  // negative where the edge functions are; adding zero clears the sign of -0
-        if (const unsigned ties = lanes & (equal(u, zero) | equal(v, zero) | equal(w, zero)); ties != 0) [[unlikely]]
-            lanes = settle_ties(corners.block, lanes, ties, side);
+        if constexpr (sizeof(Real) == sizeof(double)) {
+            Solution64<Isa> hits;
+            const Real4 weight[3] = {u, v, w};
+            lanes = hits.solve(lanes, x, y, z, weight, ray_.direction[axis_[2]]);
+            return offer(corners, lanes, hits.t, hits.u, hits.v, query);
+        } else {
+            Float4 side = low + zero;  // negative where the edge functions are; adding zero clears the sign of -0
+            if (const unsigned ties = lanes & (equal(u, zero) | equal(v, zero) | equal(w, zero)); ties != 0) [[unlikely]]
+                lanes = settle_ties(corners.block, lanes, ties, side);
 
-        alignas(16) float ts[4], us[4], vs[4];
-        intersect(corners, lanes, side, ts, us, vs);
+            alignas(16) float ts[4], us[4], vs[4];
+            intersect(corners, lanes, side, ts, us, vs);
+            return offer(corners, lanes, ts, us, vs, query);
+        }
+    }
+
+private:
+    template <class Corners, class Query>
+    [[gnu::always_inline]] static bool offer(const Corners& corners, unsigned lanes, const Real (&ts)[4], const Real (&us)[4],
+                                             const Real (&vs)[4], Query& query) {
         for (; lanes != 0; lanes &= lanes - 1) {
             const int lane = __builtin_ctz(lanes);
             if (query.offer(ts[lane], us[lane], vs[lane], static_cast<std::uint32_t>(corners.block.prim_at(lane)))) return true;
@@ -70,7 +93,6 @@ public:
         return false;
     }
 
-private:
     // t, u and v in double, rounded once. The plane across the ray is scaled by the direction's longest component,
     // which spares the divisions. Where only the rounding of the corners let the ray in, a weight is on the wrong side
     // here: there the rounded triangle is what is hit, and t lies where its boxes are looked for.
@@ -159,8 +181,8 @@ private:
 
     const Frame& ray_;
     std::size_t axis_[3];  // the direction's longest axis last
-    float shear_[2];
-    Float4 origin_[3];
+    Real shear_[2];
+    Real4 origin_[3];
 };
 
 }  // namespace wive

@@ -51,11 +51,11 @@ float least_step(float lowest, float highest) {
 // The vertices of one block, equal where their bits are.
 class SharedVertices {
 public:
-    void add_triangle(const Mesh& mesh, std::uint32_t prim) {
+    void add_triangle(const Mesh<float>& mesh, std::uint32_t prim) {
         for (int k = 0; k < 3; ++k) add(mesh.corner(prim, k));
     }
     // How many of a triangle's corners are not among the vertices yet.
-    int added_by(const Mesh& mesh, std::uint32_t prim) const {
+    int added_by(const Mesh<float>& mesh, std::uint32_t prim) const {
         SharedVertices with = *this;
         with.add_triangle(mesh, prim);
         return with.count_ - count_;
@@ -89,7 +89,7 @@ private:
 // there is room, the one that adds the fewest vertices.
 class LeafPacker {
 public:
-    LeafPacker(const Mesh& mesh, std::span<const std::uint32_t> prims) : mesh_(mesh), count_(prims.size()) {
+    LeafPacker(const Mesh<float>& mesh, std::span<const std::uint32_t> prims) : mesh_(mesh), count_(prims.size()) {
         std::copy(prims.begin(), prims.end(), left_.begin());
     }
     bool done() const { return count_ == 0; }
@@ -120,13 +120,13 @@ public:
     }
 
 private:
-    const Mesh& mesh_;
+    const Mesh<float>& mesh_;
     std::array<std::uint32_t, max_compressed_leaf> left_;
     std::array<std::uint32_t, block_width> block_;
     std::size_t count_;
 };
 
-void write_block(const Mesh& mesh, std::span<const std::uint32_t> prims, SharedVertices vertices, std::byte* out) {
+void write_block(const Mesh<float>& mesh, std::span<const std::uint32_t> prims, SharedVertices vertices, std::byte* out) {
     const int stored = vertices.stored();
     std::uint32_t corners[2] = {0, static_cast<std::uint32_t>(stored) << 20};
     for (std::size_t lane = 0; lane < prims.size(); ++lane) {
@@ -170,7 +170,7 @@ void CompressedWriter::write_node(const wive::Node& node, int children, Node& ou
     }
 }
 
-LeafSize CompressedWriter::leaf_size(const Mesh& mesh, std::span<const std::uint32_t> prims) {
+LeafSize CompressedWriter::leaf_size(const Mesh<float>& mesh, std::span<const std::uint32_t> prims) {
     LeafSize size = {0, 0};
     for (LeafPacker packer(mesh, prims); !packer.done(); ++size.blocks) {
         SharedVertices vertices;
@@ -180,7 +180,7 @@ LeafSize CompressedWriter::leaf_size(const Mesh& mesh, std::span<const std::uint
     return size;
 }
 
-LeafSize CompressedWriter::write_leaf(const Mesh& mesh, Accuracy, std::span<const std::uint32_t> prims, std::byte* out) {
+LeafSize CompressedWriter::write_leaf(const Mesh<float>& mesh, Accuracy, std::span<const std::uint32_t> prims, std::byte* out) {
     LeafSize size = {0, 0};
     for (LeafPacker packer(mesh, prims); !packer.done(); ++size.blocks) {
         SharedVertices vertices;

@@ -9,6 +9,7 @@
 #include "emit.h"
 #include "layout.h"
 #include "mesh.h"
+#include "write_float32.h"
 
 namespace wive {
 
@@ -18,9 +19,18 @@ struct CompressedWriter {
 
     // Every box of `out` holds that of `node`, in exact arithmetic. children: how many lanes are used.
     static void write_node(const wive::Node& node, int children, Node& out);
-    static LeafSize leaf_size(const Mesh& mesh, std::span<const std::uint32_t> prims);
+    static LeafSize leaf_size(const Mesh<float>& mesh, std::span<const std::uint32_t> prims);
     // The same for both accuracies.
-    static LeafSize write_leaf(const Mesh& mesh, Accuracy, std::span<const std::uint32_t> prims, std::byte* out);
+    static LeafSize write_leaf(const Mesh<float>& mesh, Accuracy, std::span<const std::uint32_t> prims, std::byte* out);
+};
+
+// Compressed nodes over blocks of doubles.
+struct CompressedFloat64Writer : Float32Writer<double> {
+    using Node = CompressedNode;
+
+    static void write_node(const wive::Node& node, int children, Node& out) {
+        CompressedWriter::write_node(node, children, out);
+    }
 };
 
 }  // namespace wive

@@ -1,4 +1,4 @@
-// Writing uncompressed nodes and blocks.
+// Writing uncompressed nodes and blocks, and blocks of doubles, which are never compressed.
 #pragma once
 
 #include <cstddef>
@@ -13,15 +13,17 @@
 
 namespace wive {
 
+template <class Real>
 struct Float32Writer {
     using Node = wive::Node;
-    using Block = TriangleBlock;
+    using Block = TriangleBlockOf<Real>;
 
     static void write_node(const wive::Node& node, int, Node& out) { out = node; }
     static constexpr std::size_t leaf_units(std::uint32_t triangles) {
         return blocks_for(triangles) * (sizeof(Block) / unit_bytes);
     }
-    static LeafSize write_leaf(const Mesh& mesh, Accuracy accuracy, std::span<const std::uint32_t> prims, std::byte* out);
+    static LeafSize write_leaf(const Mesh<Real>& mesh, Accuracy accuracy, std::span<const std::uint32_t> prims,
+                               std::byte* out);
 };
 
 }  // namespace wive

@@ -3,25 +3,19 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
+#include <cstddef>
+#include <cstring>
 #include <limits>
 
 #include "box.h"
 #include "layout.h"
 #include "mesh.h"
+#include "planes.h"
 
 namespace wive {
 
 // Larger than any plane with its slack, small enough that no arithmetic on it overflows.
 inline constexpr float empty_plane = 1e24f;
-
-// Planes relative to the centre, rounded outwards so that a box never shrinks.
-inline float plane_below(float plane, float center) {
-    const float p = plane - center;
-    const bool above = static_cast<double>(p) > static_cast<double>(plane) - center;
-    return above ? std::nextafter(p, -std::numeric_limits<float>::infinity()) : p;
-}
-inline float plane_above(float plane, float center) { return -plane_below(-plane, -center); }
 
 // A child's box; an empty one becomes a box that nothing hits.
 inline void write_box(Node& node, int lane, const Box& box, const std::array<float, 3>& center) {
@@ -33,16 +27,24 @@ inline void write_box(Node& node, int lane, const Box& box, const std::array<flo
     }
 }
 
-inline void clear_block(TriangleBlock& block) {
-    for (auto& row : block.rows) std::fill(std::begin(row), std::end(row), std::numeric_limits<float>::quiet_NaN());
+// Bytes behind a block's last row.
+template <class Real>
+inline constexpr std::size_t block_padding = sizeof(TriangleBlockOf<Real>) - sizeof TriangleBlockOf<Real>::rows - sizeof TriangleBlockOf<Real>::prim;
+
+template <class Real>
+void clear_block(TriangleBlockOf<Real>& block) {
+    for (auto& row : block.rows) std::fill(std::begin(row), std::end(row), std::numeric_limits<Real>::quiet_NaN());
     std::fill(std::begin(block.prim), std::end(block.prim), -1);
+    if constexpr (block_padding<Real> > 0)
+        std::memset(reinterpret_cast<std::byte*>(&block + 1) - block_padding<Real>, 0, block_padding<Real>);
 }
 
-inline void write_triangle(TriangleBlock& block, std::uint32_t lane, const Mesh& mesh, std::uint32_t prim,
-                           Accuracy accuracy) {
-    const float* first = mesh.corner(prim, 0);
+template <class Real>
+void write_triangle(TriangleBlockOf<Real>& block, std::uint32_t lane, const Mesh<Real>& mesh, std::uint32_t prim,
+                    Accuracy accuracy) {
+    const Real* first = mesh.corner(prim, 0);
     for (int k = 0; k < 3; ++k) {
-        const float* corner = mesh.corner(prim, k);
+        const Real* corner = mesh.corner(prim, k);
         const bool edge = accuracy == Accuracy::fast && k > 0;
         for (int axis = 0; axis < 3; ++axis)
             block.rows[3 * k + axis][lane] = edge ? corner[axis] - first[axis] : corner[axis];

@@ -1,13 +1,16 @@
 """The compiled core: builds the tree, traces batches of rays, renders rows of a picture.
 
+A tree is of float32 or float64: Real below. Its vertices, rays, t and uv have that dtype, none is converted.
 Shapes: n rays, v vertices, f faces, m inner nodes, b triangle blocks. Every array is C-contiguous.
 This is the inner door of the package: `wive.Scene` checks arguments and is what users call.
 """
 
-from typing import Literal
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
+
+Real: TypeAlias = np.floating[Any]  # float32 or float64, the same for all arrays of a tree
 
 compiler: str  # the C++ compiler's name and version
 exact_source: str  # C++ text of the exact arithmetic, which the Warp kernels compile as well
@@ -24,7 +27,7 @@ class Bvh:
 
     def __init__(
         self,
-        vertices: NDArray[np.float32],
+        vertices: NDArray[Real],
         faces: NDArray[np.int32],
         accuracy: Literal["fast", "watertight", "exact"] = "watertight",
         order: Literal["treelet", "diagonal", "slots", "none"] = "treelet",
@@ -35,17 +38,19 @@ class Bvh:
     ) -> None:
         """Build over vertices (v,3), faces (f,3). threads 0 means every core.
 
-        Raises ValueError naming the first bad vertex (NaN, infinite or beyond 1e18) or face (index out of
-        range).
+        float64 vertices make a float64 tree, "fast" or "watertight". Raises ValueError naming the first bad
+        vertex (NaN, infinite or beyond 1e18) or face (index out of range), and for float64 with "exact".
         """
-    def refitted(self, vertices: NDArray[np.float32], threads: int = 0) -> Bvh:
+    def refitted(self, vertices: NDArray[Real], threads: int = 0) -> Bvh:
         """A tree over the same faces and moved vertices (v,3), of the same shape.
 
         Of another shape where a triangle without an area gains some. Raises ValueError as construction does.
         """
     @property
-    def vertices(self) -> NDArray[np.float32]:
+    def vertices(self) -> NDArray[Any]:
         """(v,3) the array it was built from."""
+    @property
+    def precision(self) -> Literal["float32", "float64"]: ...
     @property
     def nodes(self) -> NDArray[np.uint32]:
         """(m,8,8) read-only view, rows lo.x hi.x lo.y hi.y lo.z hi.z child order; planes are float32 bits.
@@ -57,6 +62,7 @@ class Bvh:
         """(b,10,4) read-only view: nine float32 rows (fast: v0 e1 e2; else: v0 v1 v2), the prim row.
 
         Compressed: (units,8), blocks of three or four units, CompressedBlock in cpu/compressed.h.
+        float64, whatever the nodes: (b,20,4), nine rows of four float64, the prim row, a row of zeros.
         """
     @property
     def units(self) -> NDArray[np.uint32]:
@@ -72,7 +78,7 @@ class Bvh:
     def extent(self) -> NDArray[np.float32]:
         """(3,) the largest |plane| on each axis: the half size of the tree round its center."""
     @property
-    def bounds(self) -> NDArray[np.float32]:
+    def bounds(self) -> NDArray[Any]:
         """(2,3) lowest and highest corner of the triangles that can be hit; inf, -inf without any."""
     @property
     def accuracy(self) -> str: ...
@@ -91,26 +97,27 @@ class Bvh:
     def intersect(
         self,
         kernel: str,
-        origins: NDArray[np.float32],
-        directions: NDArray[np.float32],
-        tmin: NDArray[np.float32],
-        tmax: NDArray[np.float32],
+        origins: NDArray[Real],
+        directions: NDArray[Real],
+        tmin: NDArray[Real],
+        tmax: NDArray[Real],
         threads: int = 0,
         in_flight: int = 0,
         stats: bool = False,
-    ) -> tuple[NDArray[np.float32], NDArray[np.int32], NDArray[np.float32], NDArray[np.int32] | None]:
+    ) -> tuple[NDArray[Any], NDArray[np.int32], NDArray[Any], NDArray[np.int32] | None]:
         """Closest hits: t (n,), prim (n,), uv (n,2), and stats (n,3) or None; inf, -1 and NaN on a miss.
 
-        tmin and tmax have one element or n. stats columns: inner nodes, leaves, triangles tested.
+        t and uv have the tree's dtype. tmin and tmax have one element or n. stats columns: inner nodes,
+        leaves, triangles tested.
         The interpreter lock is released while rays are traced.
         """
     def occluded(
         self,
         kernel: str,
-        origins: NDArray[np.float32],
-        directions: NDArray[np.float32],
-        tmin: NDArray[np.float32],
-        tmax: NDArray[np.float32],
+        origins: NDArray[Real],
+        directions: NDArray[Real],
+        tmin: NDArray[Real],
+        tmax: NDArray[Real],
         threads: int = 0,
         in_flight: int = 0,
         stats: bool = False,
@@ -119,18 +126,18 @@ class Bvh:
     def intersect_all(
         self,
         kernel: str,
-        origins: NDArray[np.float32],
-        directions: NDArray[np.float32],
-        tmin: NDArray[np.float32],
-        tmax: NDArray[np.float32],
+        origins: NDArray[Real],
+        directions: NDArray[Real],
+        tmin: NDArray[Real],
+        tmax: NDArray[Real],
         threads: int = 0,
         in_flight: int = 0,
         stats: bool = False,
     ) -> tuple[
         NDArray[np.int64],
-        NDArray[np.float32],
+        NDArray[Any],
         NDArray[np.int32],
-        NDArray[np.float32],
+        NDArray[Any],
         NDArray[np.int32] | None,
     ]:
         """All hits: offsets (n+1,), t (h,), prim (h,), uv (h,2), and stats (n,3) or None.
@@ -141,10 +148,10 @@ class Bvh:
     def count(
         self,
         kernel: str,
-        origins: NDArray[np.float32],
-        directions: NDArray[np.float32],
-        tmin: NDArray[np.float32],
-        tmax: NDArray[np.float32],
+        origins: NDArray[Real],
+        directions: NDArray[Real],
+        tmin: NDArray[Real],
+        tmax: NDArray[Real],
         threads: int = 0,
         in_flight: int = 0,
         stats: bool = False,
@@ -175,11 +182,11 @@ class Bvh:
         """
 
 def surface_points(
-    vertices: NDArray[np.float32], faces: NDArray[np.int32], prim: NDArray[np.int32], uv: NDArray[np.float32]
+    vertices: NDArray[Real], faces: NDArray[np.int32], prim: NDArray[np.int32], uv: NDArray[Real]
 ) -> NDArray[np.float64]:
     """(n,3) points at uv (n,2) of triangles prim (n,), in double; NaN where there is no such triangle."""
 
 def surface_normals(
-    vertices: NDArray[np.float32], faces: NDArray[np.int32], prim: NDArray[np.int32]
+    vertices: NDArray[Real], faces: NDArray[np.int32], prim: NDArray[np.int32]
 ) -> NDArray[np.float64]:
     """(n,3) unit normals of triangles prim (n,), in double; NaN where there is no such triangle."""
