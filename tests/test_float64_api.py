@@ -272,14 +272,3 @@ def test_hits_do_not_depend_on_batches_threads_or_instruction_set():
             parts = [scene.intersect(rays[0][i::7], rays[1][i::7]).t for i in range(7)]
             for i, part in enumerate(parts):
                 np.testing.assert_array_equal(part, expected.t[i::7])
-
-
-def test_warp_refuses_float64_in_one_line():
-    if not wive.backends()["warp"].usable:
-        pytest.skip("no Warp")
-    with pytest.raises(ValueError) as error:
-        wive.Scene(*survey(0), backend="warp", device="cpu")
-    assert message(error) == (
-        "vertices must be float32 for backend 'warp', got float64: "
-        "convert them with vertices.astype(np.float32), or choose a CPU backend"
-    )

@@ -1,9 +1,8 @@
 """The forms of a triangle block, as cpu/layout.h and cpu/compressed.h: where its corners and prims stand.
 
-A vertex is found at the word `vertex_at`, its axes `stride` words apart. `block_at` is the
-i-th block of a leaf. `load` reads a vertex of the thread's
-triangles, `edge` and `edge_at` what lies between the first and another: `fast` trees store that,
-compressed blocks apart.
+A vertex is found at the word `vertex_at`, its axes `stride` words apart. `block_at` is the i-th block of a
+leaf. `load` reads a vertex of the thread's triangles, `edge` and `edge_at` what lies between the first and
+another: `fast` trees store that, but in compressed blocks.
 """
 
 from types import SimpleNamespace

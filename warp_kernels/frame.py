@@ -134,9 +134,7 @@ def powers_of(longest: float):
 @wp.func
 def powers_of(longest: wp.float64):  # noqa: D103, F811
     exponent = wp.min(wp.cast(longest, wp.uint64) >> wp.uint64(52), wp.uint64(2045))
-    unscale_bits = wp.where(
-        exponent > wp.uint64(0), exponent << wp.uint64(52), wp.uint64(1) << wp.uint64(51)
-    )
+    unscale_bits = wp.where(exponent > wp.uint64(0), exponent << wp.uint64(52), wp.uint64(1) << wp.uint64(51))
     return wp.vec2d(
         wp.cast((wp.uint64(2046) - exponent) << wp.uint64(52), wp.float64), wp.cast(unscale_bits, wp.float64)
     )

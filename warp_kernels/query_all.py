@@ -57,9 +57,7 @@ def list_hit(  # noqa: D103, F811
 ): ...
 
 
-def crossing_offers(
-    crossings: type, real: type, vec3: type
-) -> tuple[wp.Function, wp.Function, wp.Function]:
+def crossing_offers(crossings: type, real: type, vec3: type) -> tuple[wp.Function, wp.Function, wp.Function]:
     """Count every hit in [tmin, t], list every one, and whether one thread's hits end the query."""
 
     @wp.func

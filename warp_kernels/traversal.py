@@ -41,7 +41,10 @@ TRIANGLES = {
     ("fast", "float32"): (triangle_fast.fast_triangles, triangle_fast.KEPT_WORDS),
     ("fast", "float64"): (triangle_fast.double_triangles, 2 * triangle_fast.KEPT_WORDS),
     ("watertight", "float32"): (triangle_watertight.watertight_triangles, triangle_watertight.KEPT_WORDS),
-    ("watertight", "float64"): (triangle_watertight_float64.watertight_doubles, triangle_watertight_float64.KEPT_WORDS),
+    ("watertight", "float64"): (
+        triangle_watertight_float64.watertight_doubles,
+        triangle_watertight_float64.KEPT_WORDS,
+    ),
     ("exact", "float32"): (triangle_exact.exact_triangles, triangle_exact.KEPT_WORDS),
 }
 

@@ -13,7 +13,7 @@ from wive.crossings import CrossingQueries, LanesOption
 from wive.files import PathLike
 from wive.hits import Hits, Stats, WrappedHits, stats_of
 from wive.meshfile import load_mesh
-from wive.precision import FLOAT64, Floats, real_of
+from wive.precision import Floats, real_of
 from wive.properties import SceneProperties
 from wive.rays import check_rays
 from wive.refit import Refittable
@@ -63,8 +63,7 @@ class Scene(Refittable, CrossingQueries, SceneProperties):
         C-contiguous float32 or float64 vertices and int32 faces are kept, not copied: don't change them.
 
         Raises ValueError or TypeError, in one line naming the argument, and the index of a vertex that is NaN
-        or infinite, or that "exact" would have to round, or of a face out of range. Backend "warp" takes no
-        float64 vertices.
+        or infinite, or that "exact" would have to round, or of a face out of range.
         """
         arguments.choice("accuracy", accuracy, ("fast", "watertight", "exact"))
         arguments.choice("nodes", nodes, ("float32", "compressed"))
@@ -76,11 +75,6 @@ class Scene(Refittable, CrossingQueries, SceneProperties):
         mesh = arguments.mesh(host_array("vertices", vertices), host_array("faces", faces), accuracy)
         vertices, self._faces = map(arguments.read_only, mesh)
         self._real = real_of(vertices)
-        if self._device is not None and self._real is FLOAT64:
-            raise ValueError(
-                "vertices must be float32 for backend 'warp', got float64: "
-                "convert them with vertices.astype(np.float32), or choose a CPU backend"
-            )
         self._bvh = _cpu.Bvh(vertices, self._faces, accuracy, nodes=nodes, quality=quality)
         if self._device is not None:
             from wive.warp_tracer import WarpTracer
@@ -136,8 +130,8 @@ class Scene(Refittable, CrossingQueries, SceneProperties):
             origins, directions: (n,3) real numbers; one of shape (3,) is shared by all rays. C-contiguous
                 arrays of the scene's dtype are not copied, others are converted once. Directions may have any
                 length. Warp, torch and DLPack arrays give hits in arrays of their library, on their device,
-                without passing through the host; for a Warp scene they must lie on its device and be float32.
-                No call waits for the GPU then: with Warp's memory pools on, CUDA graphs can capture it.
+                without passing through the host; for a Warp scene they must lie on its device and have its
+                dtype. No call waits for the GPU then: with Warp's memory pools, CUDA graphs can capture it.
             tmin, tmax: a number, or (n,) one a ray, in multiples of the direction's length.
             threads: how many to use; None is every core. For CPU backends.
             in_flight: rays interleaved per thread; None leaves it to wive, 1 is plain single-ray traversal.

@@ -32,7 +32,7 @@ class WarpHits:
 
     @property
     def _kernels(self) -> SimpleNamespace:
-        return _kernels_of(precision_of(self.t))
+        return hit_kernels(precision_of(self.t))
 
     @property
     def mask(self) -> Any:
@@ -68,7 +68,7 @@ def in_double(v: wp.vec3d) -> wp.vec3d:  # noqa: D103, F811
 
 
 @functools.cache
-def _kernels_of(precision: str) -> SimpleNamespace:
+def hit_kernels(precision: str) -> SimpleNamespace:
     """The kernels for scenes of that precision, compiled together."""
     numbers = PRECISIONS[precision]
     vec2, vec3 = numbers.vec2, numbers.vec3

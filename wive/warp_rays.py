@@ -8,6 +8,7 @@ import warp as wp
 
 from wive import arguments
 from wive.arrays import NUMPY, library_of
+from wive.precision import Floats, real_named
 from wive.rays import Rays
 from wive.warp_kernels.precision import PRECISIONS, precision_of
 
@@ -39,13 +40,14 @@ class RayLoader:
         """Make the common limits."""
         self.device = device
         self.precision = precision
+        self._dtype = real_named(precision)
         numbers = PRECISIONS[precision]
         self._real, self._vec3, self._bytes = numbers.real, numbers.vec3, 4 * numbers.words
         self._common = {value: wp.full(1, value, dtype=self._real, device=device) for value in COMMON_LIMITS}
 
     def from_numpy(self, rays: Rays) -> WarpRays:
         """Checked as for every backend; copied only where the device is not the host."""
-        origins, directions, tmin, tmax = rays.numpy()
+        origins, directions, tmin, tmax = rays.numpy(self._dtype)
         return WarpRays(
             wp.array(origins, dtype=self._vec3, device=self.device, copy=False),
             wp.array(directions, dtype=self._vec3, device=self.device, copy=False),
@@ -73,7 +75,7 @@ class RayLoader:
         """(count,) vec3 of directions (count,3), or (3,) for all; NumPy's are copied to the device."""
         library = library_of(value)
         if library is NUMPY:
-            rows = arguments.directions(value, count)
+            rows = arguments.directions(value, count, self._dtype)
             if rows.strides[0] == 0:
                 one = wp.array(rows[:1], dtype=self._vec3, device=self.device)
                 return _view(one, count, 0)
@@ -115,8 +117,8 @@ class RayLoader:
         if type(value) is float and value in self._common:
             return self._common[value]
         if library_of(value) is NUMPY:
-            (number,) = arguments.limits(name, value, 1)
-            return self._limit_of_numpy(np.array([number], np.float32))
+            (number,) = arguments.limits(name, value, 1, self._dtype)
+            return self._limit_of_numpy(np.array([number], self.precision))
         array = self._checked(name, value)
         if array.shape not in ((1,), (count,)) or array.dtype is not self._real:
             raise ValueError(
@@ -124,7 +126,7 @@ class RayLoader:
             )
         return array
 
-    def _limit_of_numpy(self, values: arguments.Float32) -> Any:
+    def _limit_of_numpy(self, values: Floats) -> Any:
         if len(values) == 1 and float(values[0]) in self._common:
             return self._common[float(values[0])]
         if len(values) == 1:
