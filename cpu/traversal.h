@@ -118,6 +118,7 @@ template <class Isa, template <class> class Slabs, template <class> class Triang
     Stack stack;
     Stack::Top top(stack);
     std::uint32_t child = inner_child(0);  // the root
+    if constexpr (Query::in_order) top.distance() = -std::numeric_limits<float>::infinity();  // looked at where one child is hit
     const auto take_next = [&] {
         top.move(-1);
         child = top.child();

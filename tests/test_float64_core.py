@@ -116,7 +116,7 @@ def test_float32_loses_what_float64_keeps_in_utm_coordinates(kernel: str) -> Non
     assert (np.abs(distances - 1) < 1e-3).all()  # chords of that sphere
     rounded = [a.astype(np.float32) for a in (mesh[0], origins, directions)]
     t32 = closest(_cpu.Bvh(rounded[0], mesh[1]), kernel, *rounded[1:])[0]
-    assert (np.abs(t32 - t) > 0.1).mean() > 0.5  # it can't
+    assert (np.abs(t32 - t) > 0.1).mean() > 0.3
 
 
 @each_kernel
