@@ -65,6 +65,7 @@ def test_hits_at_survey_coordinates_are_right_to_nanometres(cpu):
     normals = np.cross(v1 - v0, v2 - v0)
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     np.testing.assert_allclose(hits.normals(), normals, rtol=0, atol=1e-12)
+    assert repr(scene).endswith("accuracy='watertight', precision='float64')")
     # float32, in which these coordinates are half a metre apart, finds other triangles
     single = wive.Scene(vertices.astype(np.float32), faces, backend=cpu)
     assert (single.intersect(origins, targets - origins).prim == prim).mean() < 0.5
