@@ -1,9 +1,11 @@
 """float64 trees of the compiled core, queries of them, and brute force in rational numbers."""
 
+import functools
 from fractions import Fraction
 from typing import Any
 
 import numpy as np
+import pytest
 from meshes import sphere
 
 from wive import _cpu
@@ -12,7 +14,9 @@ Mesh = tuple[np.ndarray, np.ndarray]
 Closest = tuple[np.ndarray, np.ndarray, np.ndarray]
 
 NODES = ("float32", "compressed")
+ACCURACIES = ("fast", "watertight")
 UTM = (500000.123, 4649776.5, 312.7)
+PLACES = [(0.0, 0.0, 0.0), UTM, (-3e9, 2e9, 1e9), (1e15, 0.0, -1e15)]
 
 
 def kernels() -> list[str]:
@@ -21,9 +25,16 @@ def kernels() -> list[str]:
     return [name for name in ("avx512", "avx2", "scalar") if not usable[name]]
 
 
+each_kernel = pytest.mark.parametrize("kernel", kernels())
+each_form = pytest.mark.parametrize("nodes", NODES)
+
+
+unit_sphere = functools.cache(sphere)
+
+
 def sphere64(level: int, radius: float = 1.0, place: tuple[float, ...] = (0.0, 0.0, 0.0)) -> Mesh:
     """A closed sphere whose coordinates are no float32 numbers."""
-    vertices, faces = sphere(level)
+    vertices, faces = unit_sphere(level)
     return vertices.astype(np.float64) * radius + np.asarray(place), faces
 
 
