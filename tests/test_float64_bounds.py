@@ -184,4 +184,16 @@ def test_sides_are_told_for_directions_of_any_length() -> None:
     for length in (1e-320, 1e-200, 1e200, 1.7e308):
         np.testing.assert_array_equal(hits.spawn([length, -length, length]), above)
         np.testing.assert_array_equal(hits.spawn([-length, length, -length]), below)
+    for nonsense in ([0, 0, np.inf], [np.inf, -np.inf, 0], [np.nan, 0, 0], [0, 0, 0]):
+        assert not scene.occluded(hits.spawn(nonsense), nonsense).any()
     assert np.isnan(scene.intersect([[-1.0, 0, 0]], [[0, 0, 1.0]]).spawn([0, 0, 1.0])).all()
+
+
+def test_triangles_too_small_for_double_to_judge_give_no_wrong_answer_and_no_warning() -> None:
+    vertices, faces = TRIANGLE
+    for scale in (1e-90, 1e-140):
+        scene = wive.Scene(scale * vertices.astype(np.float64), faces)
+        hits = scene.intersect(np.array([[0.2, 0.2, 0]]) * scale, [[0, 0, 1.0]])
+        bound, origins = hits.error_bound, hits.spawn([0, 0, 1.0])
+        assert not hits.mask[0] or bound[0] == np.inf or abs(hits.t[0] - scale) <= bound[0]
+        assert not scene.occluded(origins, [0, 0, 1.0]).any()

@@ -113,7 +113,7 @@ class Hits:
         for every accuracy, docs/accuracy.md, "The error of t". inf where double can't tell the ray from one
         in the plane, NaN on a miss. In float64, because what remains after t was rounded to float32 is far
         below what a float32 of that size resolves. For float64 scenes most of it is the error that judging
-        in double may have made: some ten units in the last place of t where that is well-conditioned.
+        in double may have made: some 25 units in the last place of t where that is well-conditioned.
 
         Computed at each call, from the arrays that held the rays: it is wrong if you have changed them.
         """

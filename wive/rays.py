@@ -4,11 +4,13 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from wive import arguments
 from wive.arrays import NUMPY, NUMPY_TYPES, Library, WarpArrays, library_of
-from wive.precision import FLOAT32, Floats, Real
+from wive.precision import FLOAT32, Real
+
+FourArrays = tuple[NDArray[Any], NDArray[Any], NDArray[Any], NDArray[Any]]
 
 
 class Rays(NamedTuple):
@@ -20,7 +22,7 @@ class Rays(NamedTuple):
     tmax: Any
     library: Library
 
-    def numpy(self, real: Real = FLOAT32) -> tuple[Floats, Floats, Floats, Floats]:
+    def numpy(self, real: Real = FLOAT32) -> FourArrays:
         """Origins, directions, tmin and tmax as the core takes them; memory is shared where it can be."""
         if self.library is NUMPY:
             return arguments.rays(self.origins, self.directions, self.tmin, self.tmax, real)

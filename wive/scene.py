@@ -13,7 +13,7 @@ from wive.crossings import CrossingQueries, LanesOption
 from wive.files import PathLike
 from wive.hits import Hits, Stats, WrappedHits, stats_of
 from wive.meshfile import load_mesh
-from wive.precision import Floats, real_of
+from wive.precision import FLOAT32, Floats, real_of
 from wive.properties import SceneProperties
 from wive.rays import check_rays
 from wive.refit import Refittable
@@ -217,7 +217,8 @@ class Scene(Refittable, CrossingQueries, SceneProperties):
 
     def __repr__(self) -> str:
         """Size and options."""
-        return f"Scene({len(self)} triangles, backend={self.backend!r}, accuracy={self.accuracy!r})"
+        shown = f"{len(self)} triangles, backend={self.backend!r}, accuracy={self.accuracy!r}"
+        return f"Scene({shown})" if self._real is FLOAT32 else f"Scene({shown}, precision='float64')"
 
     def __reduce__(self) -> tuple[Callable[..., "Scene"], tuple[Any, ...]]:
         """Pickle the mesh and the options; the tree is rebuilt where they are loaded."""

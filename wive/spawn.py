@@ -76,7 +76,8 @@ def spawn_origins(
         corners = corner_rows(vertices, faces, prim[rows])
         u, v = uv[rows].astype(np.float64).T
         direction = directions[rows].astype(np.float64).T
-        origins[rows] = _origins(corners, u, v, direction, CLEARANCES[accuracy], rounding).T
+        with np.errstate(all="ignore"):  # an infinite direction; a triangle whose area underflows
+            origins[rows] = _origins(corners, u, v, direction, CLEARANCES[accuracy], rounding).T
     return origins
 
 
@@ -87,9 +88,8 @@ def _origins(
     first, second = v1 - v0, v2 - v0
     normal = cross(first, second)
     area = np.sqrt(dot(normal, normal))
-    with np.errstate(invalid="ignore"):  # an infinite direction
-        _, exponent = np.frexp(abs(direction).max(axis=0))
-        normal *= np.where(dot(normal, np.ldexp(direction, -exponent)) < 0, -1.0, 1.0)
+    _, exponent = np.frexp(abs(direction).max(axis=0))  # directions of any length neither over- nor underflow
+    normal *= np.where(dot(normal, np.ldexp(direction, -exponent)) < 0, -1.0, 1.0)
     normal /= area
     point = (1 - u - v) * v0 + u * v1 + v * v2
     largest = abs(corners).max(axis=0)
