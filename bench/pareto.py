@@ -1,11 +1,12 @@
-"""Speed against error: accuracies and node forms, Embree's fast and robust modes, wp.mesh_query_ray.
+"""Speed against error: accuracies, node forms and float64, Embree's fast and robust modes, wp.mesh_query_ray.
 
 A closed sphere of 81,920 triangles at five scales and five places. `leaks`: the share of rays aimed from
 inside at its vertices and edges that miss. `wrong`: of rays in any direction, the share whose triangle is not
 that of accuracy "exact" on the scalar backend, which the tests hold to exact rationals. `t_median`,
 `t_worst`: the error of t in units in the last place, where the triangle is right, against t in double. Speed
 is of the latter rays on the unmoved sphere of radius 1, all contenders in turn on one core; `mrays` with as
-many rays in flight as a batch gets, `single` with one. Tables give shares in millionths (ppm).
+many rays in flight as a batch gets, `single` with one. Tables give shares in millionths (ppm). `float64` is
+"watertight" over the same numbers as float64 vertices and rays.
 """
 
 import argparse
@@ -70,7 +71,15 @@ def main(options: Sequence[str]) -> None:
     )
     for name in missing:
         print(f"not here: {name}")
-    content = {"means": means, "rows": rows, "missing": missing, "triangles": len(cases[0].faces)}
+    cost = float64_cost(speed)
+    print(f"float64 / float32, both watertight: {cost['mrays']:.3f} in flight, {cost['single']:.3f} single")
+    content = {
+        "means": means,
+        "rows": rows,
+        "missing": missing,
+        "triangles": len(cases[0].faces),
+        "float64_to_float32": cost,
+    }
     report.save("pareto", content, draw(means, rows), chosen.out, whole=not chosen.quick)
 
 
@@ -155,6 +164,12 @@ def speeds(found: Sequence[Contender], rays: tuple[Array, Array], effort: Effort
         rows[name][column] = len(rays[0]) / outcome.our_seconds * 1e-6
         rows[name][f"{column}_ratio"] = outcome.ratio  # to the first contender's, wive fast in flight
     return rows
+
+
+def float64_cost(speed: dict[str, report.Row]) -> dict[str, float]:
+    """Speed of float64 by that of float32, in flight and one by one."""
+    double, single = speed["float64"], speed["watertight"]
+    return {way: double[f"{way}_ratio"] / single[f"{way}_ratio"] for way in ("mrays", "single")}
 
 
 def parse_options(options: Sequence[str]) -> argparse.Namespace:

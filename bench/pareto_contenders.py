@@ -2,23 +2,34 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bench.compiled_shim import BenchError
 from wive import _cpu
+from wive.precision import Floats, real_named
 
 Array = NDArray[np.float32]
-Hits = tuple[Array, NDArray[np.int32]]  # t and prim; prim -1 on a miss
+Hits = tuple[Floats, NDArray[np.int32]]  # t and prim; prim -1 on a miss
 Trace = Callable[[Array, Array], Hits]
 
-WIVE: dict[str, tuple[Literal["fast", "watertight", "exact"], Literal["float32", "compressed"]]] = {
-    "fast": ("fast", "float32"),
-    "watertight": ("watertight", "float32"),
-    "compressed": ("watertight", "compressed"),
-    "exact": ("exact", "float32"),
+
+class Options(NamedTuple):
+    """Of one of our trees."""
+
+    accuracy: Literal["fast", "watertight", "exact"]
+    nodes: Literal["float32", "compressed"] = "float32"
+    precision: Literal["float32", "float64"] = "float32"
+
+
+WIVE = {
+    "fast": Options("fast"),
+    "watertight": Options("watertight"),
+    "compressed": Options("watertight", nodes="compressed"),
+    "exact": Options("exact"),
+    "float64": Options("watertight", precision="float64"),
 }
 EMBREE = {"embree fast": False, "embree robust": True}
 CONTENDERS = (*WIVE, *EMBREE, "mesh_query_ray")
@@ -66,11 +77,23 @@ def exact_prims(
 
 
 def _wive(name: str, kernel: str, vertices: Array, faces: NDArray[np.int32]) -> Contender:
-    accuracy, nodes = WIVE[name]
-    bvh = _cpu.Bvh(vertices, faces, accuracy, nodes=nodes)
+    options = WIVE[name]
+    real = real_named(options.precision)
+    bvh = _cpu.Bvh(real.array(vertices), faces, options.accuracy, nodes=options.nodes)
+    zero, infinite = real.limits.values()
+    held: dict[int, Floats] = {}  # rays in this precision: who has such numbers has such rays
+
+    def ready(rays: Array) -> Floats:
+        if id(rays) not in held:
+            held[id(rays)] = real.array(rays)
+        return held[id(rays)]
 
     def tracing(in_flight: int) -> Trace:
-        return lambda o, d: bvh.intersect(kernel, o, d, ZERO, INFINITE, threads=1, in_flight=in_flight)[:2]
+        def trace(origins: Array, directions: Array) -> Hits:
+            o, d = ready(origins), ready(directions)
+            return bvh.intersect(kernel, o, d, zero, infinite, threads=1, in_flight=in_flight)[:2]
+
+        return trace
 
     return Contender(name, tracing(0), tracing(1))
 

@@ -38,18 +38,20 @@ def sphere(level: int = 3, radius: float = 1.0) -> tuple[np.ndarray, np.ndarray]
     return (points * radius).astype(np.float32), faces.astype(np.int32)
 
 
-def soup(count: int, seed: int, size: float = 0.2) -> tuple[np.ndarray, np.ndarray]:
+def soup(count: int, seed: int, size: float = 0.2, dtype: type = np.float32) -> tuple[np.ndarray, np.ndarray]:
     """Triangles of random place and direction in the unit cube."""
     random = np.random.default_rng(seed)
     corners = random.random((count, 1, 3)) + size * random.standard_normal((count, 3, 3))
-    return corners.reshape(-1, 3).astype(np.float32), np.arange(3 * count, dtype=np.int32).reshape(-1, 3)
+    return corners.reshape(-1, 3).astype(dtype), np.arange(3 * count, dtype=np.int32).reshape(-1, 3)
 
 
-def random_rays(count: int, seed: int, low: float = -1.5, high: float = 1.5) -> tuple[np.ndarray, np.ndarray]:
+def random_rays(
+    count: int, seed: int, low: float = -1.5, high: float = 1.5, dtype: type = np.float32
+) -> tuple[np.ndarray, np.ndarray]:
     """Rays from random points of a cube in random directions, not of unit length."""
     random = np.random.default_rng(seed)
-    origins = random.uniform(low, high, (count, 3)).astype(np.float32)
-    return origins, random.standard_normal((count, 3)).astype(np.float32)
+    origins = random.uniform(low, high, (count, 3)).astype(dtype)
+    return origins, random.standard_normal((count, 3)).astype(dtype)
 
 
 def all_crossings(

@@ -91,10 +91,13 @@ def test_bench_python_agrees_on_closest_hits(bench: Callable[..., dict[str, Any]
 
 
 def test_bench_pareto_finds_no_leak_where_none_is_promised(bench: Callable[..., dict[str, Any]]) -> None:
-    means = {row["contender"]: row for row in bench("pareto")["means"]}
-    assert {"fast", "watertight", "compressed", "exact"} <= means.keys()
-    for name in ("watertight", "compressed", "exact"):
+    content = bench("pareto")
+    means = {row["contender"]: row for row in content["means"]}
+    assert {"fast", "watertight", "compressed", "exact", "float64"} <= means.keys()
+    for name in ("watertight", "compressed", "exact", "float64"):
         assert means[name]["leaks"] == 0
+    assert means["float64"]["t_worst"] < 1e-3
+    assert all(ratio > 0 for ratio in content["float64_to_float32"].values())
     assert means["exact"]["wrong"] == 0
     assert means["exact"]["t_worst"] < 0.51
     assert all(row["mrays"] > 0 for row in means.values())

@@ -73,11 +73,11 @@ def test_a_file_of_several_meshes_is_joined_and_placed(tmp_path):
     assert scene.intersect([30, 0.01, 0.02], [-1, 0, 0]).t[0] == pytest.approx(19, abs=0.1)
 
 
-def test_npz_meshes_keep_their_arrays(tmp_path):
+def test_npz_meshes_give_their_arrays_as_float32(tmp_path):
     vertices, faces = sphere(0)
     np.savez(tmp_path / "mesh.npz", vertices=vertices.astype(np.float64), faces=faces)
     loaded_vertices, loaded_faces = wive.load_mesh(tmp_path / "mesh.npz")
-    assert loaded_vertices.dtype == np.float64
+    assert loaded_vertices.dtype == np.float32
     np.testing.assert_array_equal(loaded_vertices, vertices)
     np.testing.assert_array_equal(loaded_faces, faces)
 

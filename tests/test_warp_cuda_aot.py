@@ -44,6 +44,11 @@ BUILDS = [(*build, accuracy) for build in _BUILDS for accuracy in ("fast", "wate
 COMPRESSED_BUILDS = [(query, accuracy) for query in KERNELS for accuracy in ("fast", "watertight")] + [
     (query, "exact") for query in EXACT_QUERIES
 ]
+DOUBLE_BUILDS = [
+    (query, architecture, accuracy, "float32")
+    for query, architecture in [*((query, 90) for query in KERNELS), ("closest", 80), ("closest", 100)]
+    for accuracy in ("fast", "watertight")
+] + [("closest", 90, "watertight", "compressed")]
 
 # Registers, measured with NVRTC and ptxas 13.5 and rounded up to a multiple of eight.
 REGISTERS = {
@@ -63,6 +68,13 @@ COMPRESSED_REGISTERS = {
     ("exact", 8): 128,
     ("exact", 1): 120,
 }
+# The same of float64 scenes, in either form of nodes.
+DOUBLE_REGISTERS = {
+    ("fast", 8): 152,
+    ("watertight", 8): 144,
+    ("fast", 1): 120,
+    ("watertight", 1): 104,
+}
 # Bytes: a thread that owns its stack holds a child and, for the closest hit, a distance an entry, and up to
 # eleven words of the ray behind them. A group's stack is in shared memory.
 STACK_BYTES = {
@@ -71,6 +83,7 @@ STACK_BYTES = {
     "count": STACK * 4 + 48,
     "all": STACK * 4 + 48,
 }
+DOUBLE_STACK_BYTES = 32  # more: rays are kept in double
 EXACT_STACK_BYTES = 9 * 1024  # the integers of the rare cases: two triangles' where hits are compared
 
 
@@ -176,6 +189,22 @@ def test_kernel_for_compressed_nodes_compiles_within_its_limits(
 
 @pytest.mark.timeout(120)
 @pytest.mark.parametrize("lanes", [8, 1])
+@pytest.mark.parametrize(("query", "architecture", "accuracy", "nodes"), DOUBLE_BUILDS)
+def test_kernel_for_float64_scenes_compiles_within_its_limits(
+    query: str, architecture: int, accuracy: str, nodes: str, lanes: int, tmp_path: Path
+) -> None:
+    kernel = KERNELS[query](accuracy, lanes, STACK, nodes=nodes, precision="float64")
+    kernel.module.options["block_dim"] = default_block_dim(lanes)
+    ptx = compiled_ptx(kernel.module, architecture, tmp_path)
+    assert ("ld.global.nc.v2.f64" in ptx) == (lanes == 8)
+    usage = assemble(ptx, architecture, tmp_path)
+    assert usage.spills == 0
+    assert usage.stack <= stack_limit(query, accuracy, lanes) + (DOUBLE_STACK_BYTES if lanes == 8 else 0)
+    assert usage.registers <= DOUBLE_REGISTERS[accuracy, lanes]
+
+
+@pytest.mark.timeout(120)
+@pytest.mark.parametrize("lanes", [8, 1])
 def test_kernel_with_counters_compiles_for_cuda(lanes: int, tmp_path: Path) -> None:
     for query in ("closest", "any", "count"):
         folder = tmp_path / query
@@ -184,7 +213,9 @@ def test_kernel_with_counters_compiles_for_cuda(lanes: int, tmp_path: Path) -> N
 
 
 @pytest.mark.timeout(120)
-@pytest.mark.parametrize("kernel", [sorting.sort_hits, sorting.shift_counts])
+@pytest.mark.parametrize(
+    "kernel", [sorting.sort_kernel("float32"), sorting.sort_kernel("float64"), sorting.shift_counts]
+)
 def test_kernel_that_orders_hits_keeps_them_in_registers(kernel: wp.Kernel, tmp_path: Path) -> None:
     usage = assemble(compiled_ptx(kernel.module, 90, tmp_path), 90, tmp_path)
     assert usage.spills == usage.stack == 0

@@ -151,6 +151,15 @@ def test_handle_of_a_compressed_tree_is_an_error_and_misses() -> None:
         warp_kernels.check(tree)
 
 
+def test_handle_of_a_float64_tree_is_an_error_and_misses() -> None:
+    vertices, faces = soup(100, 1)
+    tree = warp_kernels.upload(_cpu.Bvh(vertices.astype(np.float64), faces), "cpu")
+    found = trace(trace_watertight, tree, random_rays(50, 2))
+    assert (found.prim == -1).all() and not found.occluded.any()
+    with pytest.raises(warp_kernels.CorruptTreeError, match=r"float32 vertices.*astype\(np.float32\)"):
+        warp_kernels.check(tree)
+
+
 def test_tree_too_deep_for_the_functions_is_an_error_and_misses() -> None:
     tree = warp_kernels.upload(_cpu.Bvh(*soup(100, 1)), "cpu")
     tree.handle.stack = 129

@@ -7,6 +7,7 @@ import numpy as np
 import warp as wp
 
 from wive import _cpu, warp_kernels
+from wive.warp_kernels.precision import PRECISIONS
 
 # One size for all trees here, so that a kernel is compiled once.
 STACK = 128
@@ -41,7 +42,7 @@ def cpu_answers(
     tmin: np.ndarray = ZERO,
     tmax: np.ndarray = INFINITE,
 ) -> Answers:
-    rays = origins, directions, tmin, tmax
+    rays = origins, directions, tmin.astype(origins.dtype), tmax.astype(origins.dtype)
     t, prim, uv, steps = bvh.intersect(kernel, *rays, threads=1, in_flight=1, stats=True)
     occluded, any_steps = bvh.occluded(kernel, *rays, threads=1, in_flight=1, stats=True)
     assert steps is not None and any_steps is not None
@@ -64,16 +65,13 @@ def warp_answers(
 ) -> Answers:
     tree = dataclasses.replace(warp_kernels.upload(bvh, device), stack=STACK)
     count = len(origins)
-    rays = [
-        wp.array(origins, dtype=wp.vec3, device=device),
-        wp.array(directions, dtype=wp.vec3, device=device),
-        wp.array(tmin, dtype=wp.float32, device=device),
-        wp.array(tmax, dtype=wp.float32, device=device),
-    ]
-    t, prim = wp.zeros(count, dtype=wp.float32, device=device), wp.zeros(count, dtype=wp.int32, device=device)
-    uv, occluded = (
-        wp.zeros(count, dtype=wp.vec2, device=device),
-        wp.zeros(count, dtype=wp.bool, device=device),
+    numbers = PRECISIONS[tree.precision]
+    dtypes = numbers.vec3, numbers.vec3, numbers.real, numbers.real
+    given = zip((origins, directions, tmin, tmax), dtypes, strict=True)
+    rays = [wp.array(values, dtype=dtype, device=device) for values, dtype in given]
+    t, prim, uv, occluded = (
+        wp.zeros(count, dtype=dtype, device=device)
+        for dtype in (numbers.real, wp.int32, numbers.vec2, wp.bool)
     )
     counts = wp.zeros(count, dtype=wp.int32, device=device)
     steps = [wp.zeros(count, dtype=wp.vec3i, device=device) for _ in range(3)]
@@ -82,7 +80,7 @@ def warp_answers(
     warp_kernels.launch_count(tree, *rays, counts, stats=steps[2], lanes=lanes, block_dim=block_dim)
     offsets = warp_kernels.scan_counts(counts)
     total = int(offsets.numpy()[-1])
-    listed = [wp.zeros(total, dtype=dtype, device=device) for dtype in (wp.float32, wp.int32, wp.vec2)]
+    listed = [wp.zeros(total, dtype=dtype, device=device) for dtype in (numbers.real, wp.int32, numbers.vec2)]
     left = wp.clone(counts)
     warp_kernels.launch_all(tree, *rays, left, offsets, *listed, lanes=lanes, block_dim=block_dim)
     warp_kernels.check(tree)
@@ -95,7 +93,8 @@ def assert_bit_identical(one: Answers, other: Answers, fields: Sequence[str] | N
     """Every number of the same bits (the bits of a NaN aside: which NaN a miss holds means nothing)."""
     for field in fields or [field.name for field in dataclasses.fields(Answers)]:
         mine, theirs = getattr(one, field), getattr(other, field)
-        if mine.dtype == np.float32:
+        if mine.dtype.kind == "f":
+            assert mine.dtype == theirs.dtype
             np.testing.assert_array_equal(np.isnan(mine), np.isnan(theirs), err_msg=field)
-            mine, theirs = (np.where(np.isnan(a), 0, a).view(np.uint32) for a in (mine, theirs))
+            mine, theirs = (np.where(np.isnan(a), 0, a).view(f"u{a.itemsize}") for a in (mine, theirs))
         np.testing.assert_array_equal(mine, theirs, err_msg=field)

@@ -1,8 +1,8 @@
-"""The two forms of a triangle block, as cpu/layout.h and cpu/compressed.h: where its corners and prims stand.
+"""The forms of a triangle block, as cpu/layout.h and cpu/compressed.h: where its corners and prims stand.
 
-A vertex is found at the word `vertex_at`, its axes `stride` words apart. `block_at` is the
-i-th block of a leaf. `load` reads a vertex of the thread's
-triangles, `edge` and `edge_at` what lies between the first and another: `fast` float32 trees store that.
+A vertex is found at the word `vertex_at`, its axes `stride` words apart. `block_at` is the i-th block of a
+leaf. `load` reads a vertex of the thread's triangles, `edge` and `edge_at` what lies between the first and
+another: `fast` trees store that, but in compressed blocks.
 """
 
 from types import SimpleNamespace
@@ -14,45 +14,50 @@ import warp as wp
 from wive.warp_kernels.handle import BLOCK_WORDS, LEAST_COMPRESSED_WORDS, PRIM_ROW
 from wive.warp_kernels.lanes import load_float, without_gradient
 from wive.warp_kernels.native import PICK_1, PICK_4
+from wive.warp_kernels.precision import PRECISIONS
 
 
-def float32_block(lanes: SimpleNamespace) -> SimpleNamespace:
+def plain_block(lanes: SimpleNamespace, precision: str) -> SimpleNamespace:
     """Four triangles side by side; NaN fails every test in the lanes that are not used."""
     load_triangles = lanes.load_triangles
+    numbers = PRECISIONS[precision]
+    real, load_number = numbers.real, numbers.load
+    words: int = numbers.words
+    block_words: int = BLOCK_WORDS * words
 
     @wp.func
     def block_at(units: wp.uint64, begin: int, i: int):
-        return begin + wp.static(BLOCK_WORDS) * i
+        return begin + block_words * i
 
     @wp.func
     def stride(units: wp.uint64, block: int):
-        return 4
+        return 4 * words
 
     @wp.func
     def vertex_at(units: wp.uint64, block: int, k: int, j: int):
-        return block + 12 * k + j
+        return block + 12 * words * k + words * j
 
     @wp.func
     def prim_at(units: wp.uint64, block: int, j: int):
-        return block + wp.static(PRIM_ROW) + j
+        return block + wp.static(PRIM_ROW) * words + j
 
     @wp.func
     def load(units: wp.uint64, block: int, lane: int, k: int, axis: int):
-        return load_triangles(units, block + 12 * k + 4 * axis, lane)
+        return load_triangles(units, block + 12 * words * k + 4 * words * axis, lane)
 
     @wp.func
     def edge(units: wp.uint64, block: int, lane: int, k: int, axis: int):
-        return load_triangles(units, block + 12 * k + 4 * axis, lane)
+        return load_triangles(units, block + 12 * words * k + 4 * words * axis, lane)
 
     @wp.func
-    def edge_at(units: wp.uint64, at: int, v0: float):
-        return load_float(units, at)
+    def edge_at(units: wp.uint64, at: int, v0: real):
+        return load_number(units, at)
 
     @wp.func
     def used(units: wp.uint64, block: int, lane: int, passed: wp.uint32):
         return passed
 
-    return _block(BLOCK_WORDS, block_at, stride, vertex_at, prim_at, load, edge, edge_at, used)
+    return _block(block_words, block_at, stride, vertex_at, prim_at, load, edge, edge_at, used)
 
 
 def compressed_block(lanes: SimpleNamespace) -> SimpleNamespace:
@@ -114,4 +119,8 @@ def _block(least_words: int, *functions: wp.Function) -> SimpleNamespace:
     return SimpleNamespace(least_words=least_words, **found)
 
 
-BLOCKS = {"float32": float32_block, "compressed": compressed_block}
+def block_form(lanes: SimpleNamespace, nodes: str, precision: str) -> SimpleNamespace:
+    """The blocks of a tree with this form of nodes: those of float64 are never compressed."""
+    if nodes == "compressed" and precision == "float32":
+        return compressed_block(lanes)
+    return plain_block(lanes, precision)

@@ -12,7 +12,6 @@ import warp as wp
 from wive.warp_kernels.frame import load_frame
 from wive.warp_kernels.handle import (
     ACCURACIES,
-    COMPRESSED,
     NO_PRIM,
     STACK_TOO_SMALL,
     WRONG_ACCURACY,
@@ -40,15 +39,15 @@ _count_exact = make_traversal("count", "exact", 8, STACK, False)
 
 
 @wp.func
-def _refused(error: wp.array(dtype=wp.int32), stack: int, accuracy: int, wanted: int, compressed: int):
+def _refused(error: wp.array(dtype=wp.int32), stack: int, accuracy: int, wanted: int, refusal: int):
     """Whether the tree can't be traversed here; says why in the error flag."""
     reason = int(0)  # noqa: RUF046, UP018
     if stack > STACK:
         reason = wp.static(STACK_TOO_SMALL)
     if accuracy != wanted:
         reason = wp.static(WRONG_ACCURACY)
-    if compressed != 0:
-        reason = wp.static(COMPRESSED)
+    if refusal != 0:
+        reason = refusal
     if reason != 0:
         error[0] = reason
     return reason != 0 or error[0] != 0
@@ -73,7 +72,7 @@ def closest_hit(bvh: Bvh, origin: wp.vec3, direction: wp.vec3, tmin: float, tmax
     """
     hit = _miss()
     ray = load_frame(bvh.center, bvh.extent, origin, direction, tmin, tmax)
-    if ray.valid and not _refused(bvh.error, bvh.stack, bvh.accuracy, wp.static(WATERTIGHT), bvh.compressed):
+    if ray.valid and not _refused(bvh.error, bvh.stack, bvh.accuracy, wp.static(WATERTIGHT), bvh.refusal):
         best = _closest_watertight(bvh, ray, 0).best
         if best.prim != wp.static(NO_PRIM):
             hit.t = distance_of(best, ray.scale)
@@ -88,7 +87,7 @@ def closest_hit(bvh: FastBvh, origin: wp.vec3, direction: wp.vec3, tmin: float, 
     """The closest hit in a fast tree."""
     hit = _miss()
     ray = load_frame(bvh.center, bvh.extent, origin, direction, tmin, tmax)
-    if ray.valid and not _refused(bvh.error, bvh.stack, bvh.accuracy, wp.static(FAST), bvh.compressed):
+    if ray.valid and not _refused(bvh.error, bvh.stack, bvh.accuracy, wp.static(FAST), bvh.refusal):
         best = _closest_fast(bvh, ray, 0).best
         if best.prim != wp.static(NO_PRIM):
             hit.t = distance_of(best, ray.scale)
@@ -103,7 +102,7 @@ def closest_hit(bvh: ExactBvh, origin: wp.vec3, direction: wp.vec3, tmin: float,
     """The closest hit in an exact tree."""
     hit = _miss()
     ray = load_frame(bvh.center, bvh.extent, origin, direction, tmin, tmax)
-    if ray.valid and not _refused(bvh.error, bvh.stack, bvh.accuracy, wp.static(EXACT), bvh.compressed):
+    if ray.valid and not _refused(bvh.error, bvh.stack, bvh.accuracy, wp.static(EXACT), bvh.refusal):
         best = _closest_exact(bvh, ray, 0).best
         if best.prim != wp.static(NO_PRIM):
             hit.t = distance_of(best, ray.scale)
@@ -122,7 +121,7 @@ def any_hit(bvh: Bvh, origin: wp.vec3, direction: wp.vec3, tmin: float, tmax: fl
     """
     ray = load_frame(bvh.center, bvh.extent, origin, direction, tmin, tmax)
     hit = bool(False)  # noqa: UP018
-    if ray.valid and not _refused(bvh.error, bvh.stack, bvh.accuracy, wp.static(WATERTIGHT), bvh.compressed):
+    if ray.valid and not _refused(bvh.error, bvh.stack, bvh.accuracy, wp.static(WATERTIGHT), bvh.refusal):
         hit = _any_watertight(bvh, ray, 0).best.prim != wp.static(NO_PRIM)
     return hit
 
@@ -132,7 +131,7 @@ def any_hit(bvh: FastBvh, origin: wp.vec3, direction: wp.vec3, tmin: float, tmax
     """Whether anything lies in the way in a fast tree."""
     ray = load_frame(bvh.center, bvh.extent, origin, direction, tmin, tmax)
     hit = bool(False)  # noqa: UP018
-    if ray.valid and not _refused(bvh.error, bvh.stack, bvh.accuracy, wp.static(FAST), bvh.compressed):
+    if ray.valid and not _refused(bvh.error, bvh.stack, bvh.accuracy, wp.static(FAST), bvh.refusal):
         hit = _any_fast(bvh, ray, 0).best.prim != wp.static(NO_PRIM)
     return hit
 
@@ -142,7 +141,7 @@ def any_hit(bvh: ExactBvh, origin: wp.vec3, direction: wp.vec3, tmin: float, tma
     """Whether anything lies in the way in an exact tree."""
     ray = load_frame(bvh.center, bvh.extent, origin, direction, tmin, tmax)
     hit = bool(False)  # noqa: UP018
-    if ray.valid and not _refused(bvh.error, bvh.stack, bvh.accuracy, wp.static(EXACT), bvh.compressed):
+    if ray.valid and not _refused(bvh.error, bvh.stack, bvh.accuracy, wp.static(EXACT), bvh.refusal):
         hit = _any_exact(bvh, ray, 0).best.prim != wp.static(NO_PRIM)
     return hit
 
@@ -156,7 +155,7 @@ def count_hits(bvh: Bvh, origin: wp.vec3, direction: wp.vec3, tmin: float, tmax:
     """
     ray = load_frame(bvh.center, bvh.extent, origin, direction, tmin, tmax)
     count = int(0)  # noqa: RUF046, UP018
-    if ray.valid and not _refused(bvh.error, bvh.stack, bvh.accuracy, wp.static(WATERTIGHT), bvh.compressed):
+    if ray.valid and not _refused(bvh.error, bvh.stack, bvh.accuracy, wp.static(WATERTIGHT), bvh.refusal):
         count = _count_watertight(bvh, ray, 0).best.count
     return count
 
@@ -166,7 +165,7 @@ def count_hits(bvh: FastBvh, origin: wp.vec3, direction: wp.vec3, tmin: float, t
     """How many triangles the ray meets in a fast tree."""
     ray = load_frame(bvh.center, bvh.extent, origin, direction, tmin, tmax)
     count = int(0)  # noqa: RUF046, UP018
-    if ray.valid and not _refused(bvh.error, bvh.stack, bvh.accuracy, wp.static(FAST), bvh.compressed):
+    if ray.valid and not _refused(bvh.error, bvh.stack, bvh.accuracy, wp.static(FAST), bvh.refusal):
         count = _count_fast(bvh, ray, 0).best.count
     return count
 
@@ -176,7 +175,7 @@ def count_hits(bvh: ExactBvh, origin: wp.vec3, direction: wp.vec3, tmin: float, 
     """How many triangles the ray meets in an exact tree."""
     ray = load_frame(bvh.center, bvh.extent, origin, direction, tmin, tmax)
     count = int(0)  # noqa: RUF046, UP018
-    if ray.valid and not _refused(bvh.error, bvh.stack, bvh.accuracy, wp.static(EXACT), bvh.compressed):
+    if ray.valid and not _refused(bvh.error, bvh.stack, bvh.accuracy, wp.static(EXACT), bvh.refusal):
         count = _count_exact(bvh, ray, 0).best.count
     return count
 

@@ -33,6 +33,7 @@ CORRUPT = 1
 STACK_TOO_SMALL = 2
 WRONG_ACCURACY = 3
 COMPRESSED = 4
+FLOAT64 = 5
 
 ACCURACIES = ("fast", "watertight", "exact")
 
@@ -48,7 +49,7 @@ class Bvh:
     step_limit: wp.int32  # no traversal of a sound tree takes more steps
     stack: wp.int32  # entries a traversal may need
     accuracy: wp.int32  # its place in ACCURACIES: a handle of another type has another
-    compressed: wp.int32
+    refusal: wp.int32  # why closest_hit and its like do not take the tree; 0 where they do
 
 
 @wp.struct
@@ -62,7 +63,7 @@ class FastBvh:
     step_limit: wp.int32
     stack: wp.int32
     accuracy: wp.int32
-    compressed: wp.int32
+    refusal: wp.int32
 
 
 @wp.struct
@@ -76,7 +77,7 @@ class ExactBvh:
     step_limit: wp.int32
     stack: wp.int32
     accuracy: wp.int32
-    compressed: wp.int32
+    refusal: wp.int32
 
 
 @wp.struct
@@ -92,4 +93,15 @@ class Hit:
     prim: wp.int32
 
 
+@wp.struct
+class Hit64:
+    """The same of a float64 tree."""
+
+    t: wp.float64
+    u: wp.float64
+    v: wp.float64
+    prim: wp.int32
+
+
 HANDLES: dict[str, Any] = {"fast": FastBvh, "watertight": Bvh, "exact": ExactBvh}
+HITS: dict[str, Any] = {"float32": Hit, "float64": Hit64}

@@ -1,5 +1,5 @@
 """The kernels over batches of rays: one for each query, accuracy, lane form, stack size, counters or
-none, and node form."""
+none, node form and precision."""
 
 # mypy: ignore-errors
 # Warp compiles these functions: to mypy they are no Python.
@@ -8,11 +8,13 @@ import functools
 
 import warp as wp
 
-from wive.warp_kernels.frame import load_frame
+from wive.warp_kernels.frame import LOAD_FRAME, box_tmax
 from wive.warp_kernels.handle import ALL_BITS, HANDLES, NO_PRIM
 from wive.warp_kernels.lanes import reductions
+from wive.warp_kernels.precision import PRECISIONS
 from wive.warp_kernels.query_exact import distance_of
-from wive.warp_kernels.traversal import STATES, Traversal, make_traversal, query_of
+from wive.warp_kernels.states import STATES
+from wive.warp_kernels.traversal import make_traversal, query_of
 
 # Multiplications and additions stay apart: fused, the two triangles at an edge would not compute the same
 # numbers.
@@ -25,26 +27,38 @@ def value_of(values: wp.array(dtype=wp.float32), i: int):
     return values[wp.where(values.shape[0] == 1, 0, i)]
 
 
+@wp.func
+def value_of(values: wp.array(dtype=wp.float64), i: int):  # noqa: D103, F811
+    return values[wp.where(values.shape[0] == 1, 0, i)]
+
+
 @functools.cache
 def closest_kernel(
-    accuracy: str, length: int, stack: int, counters: bool = False, nodes: str = "float32"
+    accuracy: str,
+    length: int,
+    stack: int,
+    counters: bool = False,
+    nodes: str = "float32",
+    precision: str = "float32",
 ) -> wp.Kernel:
     """The kernel behind `launch_closest`, of dimensions (n, 8 // length)."""
-    traverse = make_traversal("closest", accuracy, length, stack, counters, nodes)
-    state_type = STATES[query_of("closest", accuracy).state]
+    traverse = make_traversal("closest", accuracy, length, stack, counters, nodes, precision)
+    load_frame, numbers = LOAD_FRAME[precision], PRECISIONS[precision]
+    real, vec2, vec3 = numbers.real, numbers.vec2, numbers.vec3
+    state_type = STATES[query_of("closest", accuracy, precision).state]
     or_reduce, min_reduce = reductions(length)
     tree_type = HANDLES[accuracy]
 
     @wp.kernel(module="unique", enable_backward=False, grid_stride=False, module_options=MODULE_OPTIONS)
     def closest(
         tree: tree_type,
-        origins: wp.array(dtype=wp.vec3),
-        directions: wp.array(dtype=wp.vec3),
-        tmin: wp.array(dtype=wp.float32),
-        tmax: wp.array(dtype=wp.float32),
-        t: wp.array(dtype=wp.float32),
+        origins: wp.array(dtype=vec3),
+        directions: wp.array(dtype=vec3),
+        tmin: wp.array(dtype=real),
+        tmax: wp.array(dtype=real),
+        t: wp.array(dtype=real),
         prim: wp.array(dtype=wp.int32),
-        uv: wp.array(dtype=wp.vec2),
+        uv: wp.array(dtype=vec2),
         stats: wp.array(dtype=wp.vec3i),
     ):
         i, lane = wp.tid()
@@ -57,20 +71,20 @@ def closest_kernel(
         if ray.valid and or_reduce(wp.uint32(tree.error[0])) == wp.uint32(0):
             found = traverse(tree, ray, lane)
         own = wp.uint32(found.best.prim)
-        if found.best.t != found.tmax:
+        if box_tmax(found.best.t) != found.tmax:
             own = ALL_BITS
         winner = min_reduce(own)
         if winner == ALL_BITS:
             if lane == 0:
-                t[i] = wp.inf
+                t[i] = real(wp.inf)
                 prim[i] = wp.static(NO_PRIM)
                 if uv:
-                    uv[i] = wp.vec2(wp.nan, wp.nan)
+                    uv[i] = vec2(real(wp.nan), real(wp.nan))
         elif own == winner:
             t[i] = distance_of(found.best, ray.scale)
             prim[i] = found.best.prim
             if uv:
-                uv[i] = wp.vec2(found.best.u, found.best.v)
+                uv[i] = vec2(found.best.u, found.best.v)
         if wp.static(counters):  # noqa: SIM102
             if lane == 0:
                 stats[i] = wp.vec3i(found.inner_nodes, found.leaves, found.triangles)
@@ -80,20 +94,27 @@ def closest_kernel(
 
 @functools.cache
 def any_kernel(
-    accuracy: str, length: int, stack: int, counters: bool = False, nodes: str = "float32"
+    accuracy: str,
+    length: int,
+    stack: int,
+    counters: bool = False,
+    nodes: str = "float32",
+    precision: str = "float32",
 ) -> wp.Kernel:
     """The kernel behind `launch_any`, of dimensions (n, 8 // length)."""
-    traverse = make_traversal("any", accuracy, length, stack, counters, nodes)
+    traverse = make_traversal("any", accuracy, length, stack, counters, nodes, precision)
+    load_frame, real, vec3 = LOAD_FRAME[precision], PRECISIONS[precision].real, PRECISIONS[precision].vec3
+    state_type = STATES[query_of("any", accuracy, precision).state]
     or_reduce, _ = reductions(length)
     tree_type = HANDLES[accuracy]
 
     @wp.kernel(module="unique", enable_backward=False, grid_stride=False, module_options=MODULE_OPTIONS)
     def any_in_the_way(
         tree: tree_type,
-        origins: wp.array(dtype=wp.vec3),
-        directions: wp.array(dtype=wp.vec3),
-        tmin: wp.array(dtype=wp.float32),
-        tmax: wp.array(dtype=wp.float32),
+        origins: wp.array(dtype=vec3),
+        directions: wp.array(dtype=vec3),
+        tmin: wp.array(dtype=real),
+        tmax: wp.array(dtype=real),
         occluded: wp.array(dtype=wp.bool),
         stats: wp.array(dtype=wp.vec3i),
     ):
@@ -101,7 +122,7 @@ def any_kernel(
         ray = load_frame(
             tree.center, tree.extent, origins[i], directions[i], value_of(tmin, i), value_of(tmax, i)
         )
-        found = Traversal()
+        found = state_type()
         found.best.prim = wp.static(NO_PRIM)
         if ray.valid and or_reduce(wp.uint32(tree.error[0])) == wp.uint32(0):
             found = traverse(tree, ray, lane)

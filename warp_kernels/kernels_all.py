@@ -7,18 +7,14 @@ import functools
 
 import warp as wp
 
-from wive.warp_kernels.frame import load_frame
-from wive.warp_kernels.handle import HANDLES, Hit
+from wive.warp_kernels.frame import LOAD_FRAME
+from wive.warp_kernels.handle import HANDLES, HITS
 from wive.warp_kernels.kernels import MODULE_OPTIONS, value_of
 from wive.warp_kernels.lanes import reductions, sum_reduction
+from wive.warp_kernels.precision import PRECISIONS
 from wive.warp_kernels.query_all import begin_crossings
-from wive.warp_kernels.traversal import Crossed, make_traversal, make_traversal_from
-
-
-@wp.func_native("return (wp::uint64)(hits.data + first);")
-def address_of_hit(hits: wp.array(dtype=Hit), first: wp.int64) -> wp.uint64:
-    """Where a ray's hits begin."""
-    ...
+from wive.warp_kernels.states import STATES
+from wive.warp_kernels.traversal import make_traversal, make_traversal_from, query_of
 
 
 @wp.func_native("return (wp::uint64)(left.data + i);")
@@ -29,10 +25,17 @@ def address_of_number(left: wp.array(dtype=wp.int32), i: int) -> wp.uint64:
 
 @functools.cache
 def count_kernel(
-    accuracy: str, length: int, stack: int, counters: bool = False, nodes: str = "float32"
+    accuracy: str,
+    length: int,
+    stack: int,
+    counters: bool = False,
+    nodes: str = "float32",
+    precision: str = "float32",
 ) -> wp.Kernel:
     """The kernel behind `launch_count`, of dimensions (n, 8 // length)."""
-    traverse = make_traversal("count", accuracy, length, stack, counters, nodes)
+    traverse = make_traversal("count", accuracy, length, stack, counters, nodes, precision)
+    load_frame, real, vec3 = LOAD_FRAME[precision], PRECISIONS[precision].real, PRECISIONS[precision].vec3
+    state_type = STATES[query_of("count", accuracy, precision).state]
     or_reduce, _ = reductions(length)
     add_reduce = sum_reduction(length)
     tree_type = HANDLES[accuracy]
@@ -40,10 +43,10 @@ def count_kernel(
     @wp.kernel(module="unique", enable_backward=False, grid_stride=False, module_options=MODULE_OPTIONS)
     def count_along(
         tree: tree_type,
-        origins: wp.array(dtype=wp.vec3),
-        directions: wp.array(dtype=wp.vec3),
-        tmin: wp.array(dtype=wp.float32),
-        tmax: wp.array(dtype=wp.float32),
+        origins: wp.array(dtype=vec3),
+        directions: wp.array(dtype=vec3),
+        tmin: wp.array(dtype=real),
+        tmax: wp.array(dtype=real),
         counts: wp.array(dtype=wp.int32),
         stats: wp.array(dtype=wp.vec3i),
     ):
@@ -51,7 +54,7 @@ def count_kernel(
         ray = load_frame(
             tree.center, tree.extent, origins[i], directions[i], value_of(tmin, i), value_of(tmax, i)
         )
-        found = Crossed()
+        found = state_type()
         if ray.valid and or_reduce(wp.uint32(tree.error[0])) == wp.uint32(0):
             found = traverse(tree, ray, lane)
         count = add_reduce(wp.uint32(found.best.count))
@@ -64,22 +67,30 @@ def count_kernel(
 
 
 @functools.cache
-def all_kernel(accuracy: str, length: int, stack: int, nodes: str = "float32") -> wp.Kernel:
+def all_kernel(
+    accuracy: str, length: int, stack: int, nodes: str = "float32", precision: str = "float32"
+) -> wp.Kernel:
     """The kernel that lists the hits behind `launch_all`, of dimensions (n, 8 // length)."""
-    traverse_from = make_traversal_from("all", accuracy, length, stack, False, nodes)
+    traverse_from = make_traversal_from("all", accuracy, length, stack, False, nodes, precision)
+    load_frame, real, vec3 = LOAD_FRAME[precision], PRECISIONS[precision].real, PRECISIONS[precision].vec3
     or_reduce, _ = reductions(length)
-    tree_type = HANDLES[accuracy]
+    tree_type, hit_type = HANDLES[accuracy], HITS[precision]
+
+    @wp.func_native("return (wp::uint64)(hits.data + first);")
+    def address_of_hit(hits: wp.array(dtype=hit_type), first: wp.int64) -> wp.uint64:
+        """Where a ray's hits begin."""
+        ...
 
     @wp.kernel(module="unique", enable_backward=False, grid_stride=False, module_options=MODULE_OPTIONS)
     def list_along(
         tree: tree_type,
-        origins: wp.array(dtype=wp.vec3),
-        directions: wp.array(dtype=wp.vec3),
-        tmin: wp.array(dtype=wp.float32),
-        tmax: wp.array(dtype=wp.float32),
+        origins: wp.array(dtype=vec3),
+        directions: wp.array(dtype=vec3),
+        tmin: wp.array(dtype=real),
+        tmax: wp.array(dtype=real),
         offsets: wp.array(dtype=wp.int64),
         left: wp.array(dtype=wp.int32),
-        hits: wp.array(dtype=Hit),
+        hits: wp.array(dtype=hit_type),
     ):
         i, lane = wp.tid()
         first = offsets[i]

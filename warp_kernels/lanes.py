@@ -18,6 +18,7 @@ from wive.warp_kernels.native import (
     ADD_REDUCE,
     DISTANCES_1,
     DISTANCES_8,
+    DOUBLE_TRIANGLES_4,
     MIN_REDUCE,
     OR_REDUCE,
     PRODUCT,
@@ -51,6 +52,19 @@ def lowest_lane(lanes: wp.uint32) -> int:
 """)
 def load_float(units: wp.uint64, at: int) -> float:
     """One word of the tree as it is."""
+    ...
+
+
+@wp.func_native("""
+    const double* number = (const double*)((const float*)units + at);
+#if defined(__CUDA_ARCH__)
+    return __ldg(number);
+#else
+    return *number;
+#endif
+""")
+def load_double(units: wp.uint64, at: int) -> wp.float64:
+    """The number that two words of the tree hold."""
     ...
 
 
@@ -116,21 +130,29 @@ def sum_reduction(length: int) -> wp.Function:
 
 
 @functools.cache
-def lanes_of(length: int, stack: int, distances: bool, kept: int) -> SimpleNamespace:
-    """The lane vectors and collectives for vectors of `length` lanes.
+def lanes_of(
+    length: int, stack: int, distances: bool, kept: int, precision: str = "float32"
+) -> SimpleNamespace:
+    """The lane vectors and collectives for vectors of `length` lanes; those of triangles are of `precision`.
 
     The stack holds `stack` children and, where `distances` is true, as many distances behind them. It is the
     thread's own vector, or the address of the group's piece of memory. Behind all that it has room for `kept`
     words.
     """
     words = stack * (2 if distances else 1) + kept
-    return _eight_lanes(words) if length == 8 else _one_lane(words)
+    return _eight_lanes(words, precision) if length == 8 else _one_lane(words, precision)
 
 
-def _eight_lanes(stack_words: int) -> SimpleNamespace:
+def _products_code(length: int, precision: str) -> str:
+    """The native code of `products`."""
+    rounded = "__fmul_rn" if precision == "float32" else "__dmul_rn"
+    return PRODUCTS.replace("LENGTH", str(length)).replace("REAL", precision).replace("ROUNDED", rounded)
+
+
+def _eight_lanes(stack_words: int, precision: str) -> SimpleNamespace:
     vector = wp.types.vector(length=8, dtype=wp.float32)
     words = wp.types.vector(length=8, dtype=wp.uint32)
-    triangles = wp.types.vector(length=4, dtype=wp.float32)
+    triangles = wp.types.vector(length=4, dtype=getattr(wp, precision))
     stack_type = wp.types.vector(length=stack_words, dtype=wp.uint32)
 
     @wp.func_native(DISTANCES_8)
@@ -139,10 +161,10 @@ def _eight_lanes(stack_words: int) -> SimpleNamespace:
     @wp.func_native(ROW_8)
     def load_row(units: wp.uint64, at: int, lane: int) -> words: ...
 
-    @wp.func_native(PRODUCTS.replace("LENGTH", "4"))
+    @wp.func_native(_products_code(4, precision))
     def products(a: triangles, b: triangles) -> triangles: ...
 
-    @wp.func_native(TRIANGLES_4)
+    @wp.func_native(TRIANGLES_4 if precision == "float32" else DOUBLE_TRIANGLES_4)
     def load_triangles(units: wp.uint64, at: int, lane: int) -> triangles: ...
 
     @wp.func_native("stack[at] = word;")
@@ -172,9 +194,12 @@ def _eight_lanes(stack_words: int) -> SimpleNamespace:
     )
 
 
-def _one_lane(stack_words: int) -> SimpleNamespace:
+def _one_lane(stack_words: int, precision: str) -> SimpleNamespace:
     vector = wp.types.vector(length=1, dtype=wp.float32)
     words = wp.types.vector(length=1, dtype=wp.uint32)
+    triangles = wp.types.vector(length=1, dtype=getattr(wp, precision))
+    load_number = load_float if precision == "float32" else load_double
+    number_words: int = 1 if precision == "float32" else 2
 
     @wp.func_native(DISTANCES_1)
     def plane_distances(units: wp.uint64, at: int, lane: int, rdir: float, bias: float) -> vector: ...
@@ -182,12 +207,12 @@ def _one_lane(stack_words: int) -> SimpleNamespace:
     @wp.func_native(ROW_1)
     def load_row(units: wp.uint64, at: int, lane: int) -> words: ...
 
-    @wp.func_native(PRODUCTS.replace("LENGTH", "1"))
-    def products(a: vector, b: vector) -> vector: ...
+    @wp.func_native(_products_code(1, precision))
+    def products(a: triangles, b: triangles) -> triangles: ...
 
     @wp.func
     def load_triangles(units: wp.uint64, at: int, lane: int):
-        return vector(load_float(units, at + (lane & 3)))
+        return triangles(load_number(units, at + number_words * (lane & 3)))
 
     @wp.func_native(shared_stack_code(stack_words))
     def shared_stack() -> wp.uint64: ...
@@ -204,7 +229,7 @@ def _one_lane(stack_words: int) -> SimpleNamespace:
         new_stack=shared_stack,
         vector=vector,
         words=words,
-        triangles=vector,
+        triangles=triangles,
         triangles_length=1,
         plane_distances=plane_distances,
         load_row=load_row,

@@ -39,7 +39,8 @@ def launch_closest(
 ) -> None:
     """Write the closest hit of each ray within its closed interval [tmin, tmax].
 
-    Every array lies on `tree.device`; nothing is checked, allocated or synchronised here.
+    Every array lies on `tree.device`; nothing is checked, allocated or synchronised here. For trees of
+    float64 vertices read vec3d, vec2d and float64 for vec3, vec2 and float32.
 
     Args:
         tree: what `upload` returned.
@@ -54,7 +55,7 @@ def launch_closest(
         block_dim: threads a block; a multiple of 8 where lanes is 1. None picks one.
         stream: the CUDA stream to launch on; None is the device's current one.
     """
-    kernel = closest_kernel(tree.accuracy, lanes, tree.stack, stats is not None, tree.nodes)
+    kernel = closest_kernel(tree.accuracy, lanes, tree.stack, stats is not None, tree.nodes, tree.precision)
     launch(kernel, tree, [origins, directions, tmin, tmax], [t, prim, uv, stats], lanes, block_dim, stream)
 
 
@@ -75,7 +76,7 @@ def launch_any(
 
     The other arguments are those of `launch_closest`.
     """
-    kernel = any_kernel(tree.accuracy, lanes, tree.stack, stats is not None, tree.nodes)
+    kernel = any_kernel(tree.accuracy, lanes, tree.stack, stats is not None, tree.nodes, tree.precision)
     launch(kernel, tree, [origins, directions, tmin, tmax], [occluded, stats], lanes, block_dim, stream)
 
 

@@ -6,10 +6,10 @@ from typing import Any
 
 import warp as wp
 
-from wive.warp_kernels.handle import Hit
+from wive.warp_kernels.handle import HITS
 from wive.warp_kernels.kernels_all import all_kernel, count_kernel
 from wive.warp_kernels.launch import Lanes, launch
-from wive.warp_kernels.sorting import shift_counts, sort_hits
+from wive.warp_kernels.sorting import shift_counts, sort_kernel
 from wive.warp_kernels.tree import Tree
 
 # What one Warp array can hold.
@@ -33,7 +33,7 @@ def launch_count(
 
     The other arguments are those of `launch_closest`.
     """
-    kernel = count_kernel(tree.accuracy, lanes, tree.stack, stats is not None, tree.nodes)
+    kernel = count_kernel(tree.accuracy, lanes, tree.stack, stats is not None, tree.nodes, tree.precision)
     launch(kernel, tree, [origins, directions, tmin, tmax], [counts, stats], lanes, block_dim, stream)
 
 
@@ -73,13 +73,13 @@ def launch_all(
         offsets: (n+1,) int64 of `scan_counts`.
         t: (h,) float32, h the last of the offsets, at most 2^31 - 1.
         prim: (h,) int32.
-        uv: (h,) vec2.
+        uv: (h,) vec2. In float64 trees t is float64 and uv vec2d.
     """
-    hits = wp.empty(len(t), dtype=Hit, device=tree.device)
-    kernel = all_kernel(tree.accuracy, lanes, tree.stack, tree.nodes)
+    hits = wp.empty(len(t), dtype=HITS[tree.precision], device=tree.device)
+    kernel = all_kernel(tree.accuracy, lanes, tree.stack, tree.nodes, tree.precision)
     launch(kernel, tree, [origins, directions, tmin, tmax], [offsets, counts, hits], lanes, block_dim, stream)
     wp.launch(
-        sort_hits,
+        sort_kernel(tree.precision),
         len(counts),
         [offsets, counts, hits],
         [t, prim, uv],

@@ -189,6 +189,16 @@ TRIANGLES_4 = """
 #endif
 """
 
+DOUBLE_TRIANGLES_4 = """
+    const double* row = (const double*)((const float*)units + at);
+#if defined(__CUDA_ARCH__)
+    const double2 a = __ldg((const double2*)row), b = __ldg((const double2*)row + 1);
+    return wp::vec_t<4, wp::float64>(a.x, a.y, b.x, b.y);
+#else
+    return wp::vec_t<4, wp::float64>(row[0], row[1], row[2], row[3]);
+#endif
+"""
+
 # Products that no compiler may fuse with an addition, whatever the options of the module they end up in:
 # fused, the two triangles at an edge would not compute the same numbers.
 PRODUCT = """
@@ -199,13 +209,26 @@ PRODUCT = """
 #endif
 """
 PRODUCTS = """
-    wp::vec_t<LENGTH, wp::float32> c;
+    wp::vec_t<LENGTH, wp::REAL> c;
 #if defined(__CUDA_ARCH__)
-    for (int i = 0; i < LENGTH; ++i) c[i] = __fmul_rn(a[i], b[i]);
+    for (int i = 0; i < LENGTH; ++i) c[i] = ROUNDED(a[i], b[i]);
 #else
     for (int i = 0; i < LENGTH; ++i) c[i] = a[i] * b[i];
 #endif
     return c;
+"""
+
+# x1 y2 - y1 x2 with the exact sign, as cpu/triangle_watertight_float64.h.
+EXACT_WEIGHT = """
+#if defined(__CUDA_ARCH__)
+    const double a = __dmul_rn(x1, y2), b = __dmul_rn(y1, x2);
+#else
+    const double a = x1 * y2, b = y1 * x2;
+#endif
+    const double a_low = fma(x1, y2, -a), b_low = -fma(y1, x2, -b);
+    const double low = a_low + b_low, b_part = low - a_low;
+    const double lowest = (a_low - (low - b_part)) + (b_low - b_part);
+    return ((a - b) + low) + lowest;
 """
 
 # A hit goes to the last free place of its ray's, and the number of those falls. It does not fall below zero:
@@ -219,11 +242,11 @@ LIST_HIT = """
     if (*(const int*)left <= 0) return;
     const int place = --*(int*)left;
 #endif
-    float* hit = (float*)hits + 4 * (wp::int64)place;
+    REAL* hit = (REAL*)hits + 4 * (wp::int64)place;
     hit[0] = t;
     hit[1] = u;
     hit[2] = v;
-    ((int*)hit)[3] = prim;
+    *(int*)(hit + 3) = prim;
 """
 
 

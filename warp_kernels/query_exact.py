@@ -24,25 +24,6 @@ class ExactBest:
     place: wp.int32  # where in the tree its triangle is, to compare it again
 
 
-@wp.struct
-class ExactTraversal:
-    """What a thread knows at the end: its own best hit, how the group stands, and the steps taken."""
-
-    best: ExactBest
-    tmax: wp.float32  # the group's
-    inner_nodes: wp.int32
-    leaves: wp.int32
-    triangles: wp.int32
-
-
-@wp.struct
-class ExactLeaf:
-    """A thread's best hit after a leaf, and the block after which it stopped."""
-
-    best: ExactBest
-    last: wp.int32
-
-
 @wp.func
 def begin_exact(ray: RayFrame):
     """Nothing hit yet."""
@@ -87,12 +68,13 @@ def take_all(found: Crossings, hit: wp.vec4, prim: int):
 
 
 # As QUERIES; `take` keeps a hit that lies within the limits, and is None where it has to compare.
+_FLOAT32 = QUERIES["float32"]
 EXACT_QUERIES = {
     "closest": SimpleNamespace(
-        **{**vars(QUERIES["closest"]), "state": ExactBest, "begin": begin_exact, "done": exact_done},
+        **{**vars(_FLOAT32["closest"]), "state": ExactBest, "begin": begin_exact, "done": exact_done},
         take=None,
     ),
-    "any": SimpleNamespace(**vars(QUERIES["any"]), take=take_any),
-    "count": SimpleNamespace(**vars(QUERIES["count"]), take=take_count),
-    "all": SimpleNamespace(**vars(QUERIES["all"]), take=take_all),
+    "any": SimpleNamespace(**vars(_FLOAT32["any"]), take=take_any),
+    "count": SimpleNamespace(**vars(_FLOAT32["count"]), take=take_count),
+    "all": SimpleNamespace(**vars(_FLOAT32["all"]), take=take_all),
 }

@@ -6,12 +6,14 @@ from types import SimpleNamespace
 # Warp compiles these functions: to mypy they are no Python.
 import warp as wp
 
-from wive.warp_kernels.frame import RayFrame
+from wive.warp_kernels.frame import box_tmin
 from wive.warp_kernels.lanes import without_gradient
 
 
-def make_visit(lanes: SimpleNamespace, form: SimpleNamespace, entries: int, in_order: bool) -> wp.Function:
-    """The visit for these lanes and form of nodes.
+def make_visit(
+    lanes: SimpleNamespace, form: SimpleNamespace, entries: int, in_order: bool, frame_type: type
+) -> wp.Function:
+    """The visit for these lanes, form of nodes and frame of a ray.
 
     entries: what the stack holds; in_order: whether the nearest goes on top.
     """
@@ -38,7 +40,7 @@ def make_visit(lanes: SimpleNamespace, form: SimpleNamespace, entries: int, in_o
         units: wp.uint64,
         node: int,
         lane: int,
-        ray: RayFrame,
+        ray: frame_type,
         tmax: float,
         stack: stack_argument,
         top: int,
@@ -61,7 +63,7 @@ def make_visit(lanes: SimpleNamespace, form: SimpleNamespace, entries: int, in_o
         far_x = distances(units, node, lane, 0, 1 - x, r[0], b[0])
         far_y = distances(units, node, lane, 1, 3 - y, r[1], b[1])
         far_z = distances(units, node, lane, 2, 5 - z, r[2], b[2])
-        tnear = wp.max(wp.max(near_x, near_y), wp.max(near_z, vector(ray.tmin)))
+        tnear = wp.max(wp.max(near_x, near_y), wp.max(near_z, vector(box_tmin(ray))))
         tfar = wp.min(wp.min(far_x, far_y), wp.min(far_z, vector(tmax)))
         # (C) permute and compress: every lane's place, the hits among them, and how many hits lie below each
         own = wp.uint32(0)

@@ -12,9 +12,9 @@ from types import SimpleNamespace
 
 import warp as wp
 
-from wive.warp_kernels import triangle_exact, triangle_fast, triangle_watertight
-from wive.warp_kernels.blocks import BLOCKS
-from wive.warp_kernels.frame import RayFrame, is_negative
+from wive.warp_kernels import triangle_exact, triangle_fast, triangle_watertight, triangle_watertight_float64
+from wive.warp_kernels.blocks import block_form
+from wive.warp_kernels.frame import FRAMES, box_tmax
 from wive.warp_kernels.handle import (
     ALL_BITS,
     BLOCK_WIDTH,
@@ -25,75 +25,52 @@ from wive.warp_kernels.handle import (
     NO_PRIM,
     NODE_WIDTH,
     NODE_WORDS,
-    SIGN_BIT,
     WORD_MASK,
 )
 from wive.warp_kernels.lanes import address_of, lanes_of, load_float, lowest_lane, without_gradient
 from wive.warp_kernels.nodes import NODES
-from wive.warp_kernels.query import QUERIES, Best
-from wive.warp_kernels.query_all import Crossings
-from wive.warp_kernels.query_exact import EXACT_QUERIES, ExactBest, ExactLeaf, ExactTraversal
+from wive.warp_kernels.precision import PRECISIONS
+from wive.warp_kernels.query import QUERIES
+from wive.warp_kernels.query_exact import EXACT_QUERIES
+from wive.warp_kernels.settling import settle_doubles, sortable, unsortable
 from wive.warp_kernels.slabs import make_visit
+from wive.warp_kernels.states import LEAVES, STATES
 from wive.warp_kernels.triangle_exact import make_exact_leaf_test
 
 TRIANGLES = {
-    "fast": (triangle_fast.fast_triangles, triangle_fast.KEPT_WORDS),
-    "watertight": (triangle_watertight.watertight_triangles, triangle_watertight.KEPT_WORDS),
-    "exact": (triangle_exact.exact_triangles, triangle_exact.KEPT_WORDS),
+    ("fast", "float32"): (triangle_fast.fast_triangles, triangle_fast.KEPT_WORDS),
+    ("fast", "float64"): (triangle_fast.double_triangles, 2 * triangle_fast.KEPT_WORDS),
+    ("watertight", "float32"): (triangle_watertight.watertight_triangles, triangle_watertight.KEPT_WORDS),
+    ("watertight", "float64"): (
+        triangle_watertight_float64.watertight_doubles,
+        triangle_watertight_float64.KEPT_WORDS,
+    ),
+    ("exact", "float32"): (triangle_exact.exact_triangles, triangle_exact.KEPT_WORDS),
 }
-
-
-@wp.struct
-class Traversal:
-    """What a thread knows at the end: its own best hit, how the group stands, and the steps taken."""
-
-    best: Best
-    tmax: wp.float32  # the group's
-    inner_nodes: wp.int32
-    leaves: wp.int32
-    triangles: wp.int32
-
-
-@wp.struct
-class Crossed:
-    """The same of a query for everything along the ray."""
-
-    best: Crossings
-    tmax: wp.float32
-    inner_nodes: wp.int32
-    leaves: wp.int32
-    triangles: wp.int32
-
-
-@wp.func
-def sortable(t: float):
-    """t as an integer that sorts as t does; -0 and 0 are one."""
-    bits = wp.cast(t + 0.0, wp.uint32)
-    return bits ^ wp.where(is_negative(t + 0.0), ALL_BITS, SIGN_BIT)
-
-
-@wp.func
-def unsortable(key: wp.uint32):
-    """The t whose `sortable` is key."""
-    positive = (key >> wp.uint32(31)) != wp.uint32(0)
-    return wp.cast(key ^ wp.where(positive, SIGN_BIT, ALL_BITS), wp.float32)
 
 
 @functools.cache
 def make_traversal(
-    query: str, accuracy: str, length: int, entries: int, counters: bool, nodes: str = "float32"
+    query: str,
+    accuracy: str,
+    length: int,
+    entries: int,
+    counters: bool,
+    nodes: str = "float32",
+    precision: str = "float32",
 ) -> wp.Function:
-    """The traversal for one query, accuracy, lane form and node form.
+    """The traversal for one query, accuracy, lane form, node form and precision.
 
     That many stack entries must do for the tree.
     """
-    traverse_from = make_traversal_from(query, accuracy, length, entries, counters, nodes)
-    asked = query_of(query, accuracy)
+    traverse_from = make_traversal_from(query, accuracy, length, entries, counters, nodes, precision)
+    asked = query_of(query, accuracy, precision)
     begin, tree_type, state_type = asked.begin, HANDLES[accuracy], STATES[asked.state]
+    frame_type = FRAMES[precision]
 
     @without_gradient
     @wp.func
-    def traverse(tree: tree_type, ray: RayFrame, lane: int) -> state_type:
+    def traverse(tree: tree_type, ray: frame_type, lane: int) -> state_type:
         return traverse_from(tree, ray, lane, begin(ray))
 
     return traverse
@@ -101,28 +78,35 @@ def make_traversal(
 
 @functools.cache
 def make_traversal_from(
-    query: str, accuracy: str, length: int, entries: int, counters: bool, nodes: str = "float32"
+    query: str,
+    accuracy: str,
+    length: int,
+    entries: int,
+    counters: bool,
+    nodes: str = "float32",
+    precision: str = "float32",
 ) -> wp.Function:
     """The same, beginning with what its last argument holds."""
-    asked = query_of(query, accuracy)
+    asked = query_of(query, accuracy, precision)
     in_order: bool = asked.in_order
-    make_triangles, kept_words = TRIANGLES[accuracy]
-    lanes = lanes_of(length, entries, in_order, kept_words)
-    blocks_form = BLOCKS[nodes](lanes)
+    make_triangles, kept_words = TRIANGLES[accuracy, precision]
+    lanes = lanes_of(length, entries, in_order, kept_words, precision)
+    blocks_form = block_form(lanes, nodes, precision)
     triangles = make_triangles(lanes, blocks_form, entries * (2 if in_order else 1))
-    visit = make_visit(lanes, NODES[nodes](lanes), entries, in_order)
+    frame_type = FRAMES[precision]
+    visit = make_visit(lanes, NODES[nodes](lanes), entries, in_order, frame_type)
     if accuracy == "exact":
         test_leaf = make_exact_leaf_test(asked, lanes, blocks_form, triangles, LEAVES[asked.state])
     else:
-        test_leaf = make_leaf_test(asked, lanes, blocks_form, triangles)
+        test_leaf = make_leaf_test(asked, lanes, blocks_form, triangles, PRECISIONS[precision].real)
     count_triangles = make_count(blocks_form)
     node_words: int = NODE_WORDS if nodes == "float32" else COMPRESSED_NODE_WORDS
     block_words: int = blocks_form.least_words
     tree_type, best_type, state_type = HANDLES[accuracy], asked.state, STATES[asked.state]
     one_is_enough: bool = asked.one_is_enough
     # Where a ray's threads may hold hits whose t round to the same float, they settle which is the best.
-    settles: bool = asked.state is ExactBest and length == 1
-    settle = triangles.settle if settles else None
+    settles: bool = in_order and length == 1 and (accuracy == "exact" or precision == "float64")
+    settle = (triangles.settle if accuracy == "exact" else settle_doubles(lanes)) if settles else None
     done = asked.done
     prepare = triangles.prepare
     new_stack, sync = lanes.new_stack, lanes.sync
@@ -131,12 +115,12 @@ def make_traversal_from(
 
     @without_gradient
     @wp.func
-    def traverse_from(tree: tree_type, ray: RayFrame, lane: int, best: best_type) -> state_type:
+    def traverse_from(tree: tree_type, ray: frame_type, lane: int, best: best_type) -> state_type:
         units = address_of(tree.units)
         words = wp.uint32(tree.units.shape[0])
         state = state_type()
         state.best = best
-        state.tmax = ray.tmax
+        state.tmax = box_tmax(ray.tmax)
         stack = new_stack()
         prepare(ray, stack)
         # Below all others is an entry that is always near enough to be taken, and whose child ends the
@@ -171,7 +155,7 @@ def make_traversal_from(
                     last = int(min_reduce(wp.uint32(tested.last)))
                     state.triangles += count_triangles(units, begin, wp.min(blocks, last + 1))
                 if wp.static(in_order):
-                    state.tmax = unsortable(min_reduce(sortable(state.best.t)))
+                    state.tmax = unsortable(min_reduce(sortable(box_tmax(state.best.t))))
                 if wp.static(one_is_enough):  # noqa: SIM102
                     if or_reduce(wp.where(done(state.best), wp.uint32(1), wp.uint32(0))) != wp.uint32(0):
                         break
@@ -185,7 +169,7 @@ def make_traversal_from(
             sync()
         if wp.static(settles):
             state.best = settle(units, stack, lane, state.best)
-            own = wp.where(state.best.prim == wp.static(NO_PRIM), wp.inf, state.best.t)
+            own = wp.where(state.best.prim == wp.static(NO_PRIM), wp.inf, box_tmax(state.best.t))
             state.tmax = unsortable(min_reduce(sortable(own)))
         return state
 
@@ -210,34 +194,17 @@ def make_count(form: SimpleNamespace) -> wp.Function:
     return count_triangles
 
 
-@wp.struct
-class TestedLeaf:
-    """A thread's best hit after a leaf, and the block after which it stopped."""
-
-    best: Best
-    last: wp.int32
-
-
-@wp.struct
-class CrossedLeaf:
-    """The same of a query for everything along the ray."""
-
-    best: Crossings
-    last: wp.int32
-
-
-# What a traversal and a leaf's test return, by what the query keeps.
-STATES = {Best: Traversal, Crossings: Crossed, ExactBest: ExactTraversal}
-LEAVES = {Best: TestedLeaf, Crossings: CrossedLeaf, ExactBest: ExactLeaf}
-
-
-def query_of(query: str, accuracy: str) -> SimpleNamespace:
-    """What is asked of a tree of that accuracy."""
-    return (EXACT_QUERIES if accuracy == "exact" else QUERIES)[query]
+def query_of(query: str, accuracy: str, precision: str = "float32") -> SimpleNamespace:
+    """What is asked of a tree of that accuracy and precision."""
+    return (EXACT_QUERIES if accuracy == "exact" else QUERIES[precision])[query]
 
 
 def make_leaf_test(
-    asked: SimpleNamespace, lanes: SimpleNamespace, form: SimpleNamespace, triangles: SimpleNamespace
+    asked: SimpleNamespace,
+    lanes: SimpleNamespace,
+    form: SimpleNamespace,
+    triangles: SimpleNamespace,
+    real: type,
 ) -> wp.Function:
     """The test of a leaf's blocks: one thread takes all, or eight a triangle each of two blocks at a time."""
     stack_argument = lanes.stack_argument
@@ -256,7 +223,7 @@ def make_leaf_test(
         blocks: int,
         lane: int,
         stack: stack_argument,
-        tmin: float,
+        tmin: real,
         best: best_type,
     ) -> leaf_type:
         leaf = leaf_type()

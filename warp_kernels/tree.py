@@ -10,9 +10,11 @@ from numpy.typing import NDArray
 from wive import _cpu
 from wive.warp_kernels.handle import (
     ACCURACIES,
+    BLOCK_WORDS,
     COMPRESSED,
     COMPRESSED_NODE_WORDS,
     CORRUPT,
+    FLOAT64,
     HANDLES,
     LEAST_COMPRESSED_WORDS,
     NODE_WIDTH,
@@ -32,6 +34,8 @@ _REASONS = {
     STACK_TOO_SMALL: "the tree is too deep for closest_hit and any_hit; use launch_closest and launch_any",
     WRONG_ACCURACY: "the handle of a tree was given to a kernel that takes that of another accuracy",
     COMPRESSED: "closest_hit and any_hit take trees with nodes 'float32'; use launch_closest and launch_any",
+    FLOAT64: "closest_hit and any_hit take trees of float32 vertices; use launch_closest and launch_any, "
+    "or make the scene with vertices.astype(np.float32)",
 }
 
 
@@ -44,8 +48,8 @@ class Tree:
     """A tree on a Warp device, made by `upload`.
 
     `handle` is what kernels take, by accuracy a `Bvh`, `FastBvh` or `ExactBvh`. `stack` is the number of
-    stack entries its kernels are compiled for, `nodes` is "float32" or "compressed". `memory` counts bytes on
-    the device.
+    stack entries its kernels are compiled for, `nodes` is "float32" or "compressed", `precision` "float32" or
+    "float64". `memory` counts bytes on the device.
     """
 
     device: wp.Device
@@ -55,6 +59,7 @@ class Tree:
     error: wp.array[Any]
     stack: int
     nodes: str = "float32"
+    precision: str = "float32"
 
     @property
     def memory(self) -> int:
@@ -88,12 +93,14 @@ def upload(bvh: _cpu.Bvh, device: wp.DeviceLike = None) -> Tree:
     handle.error = error
     handle.center = wp.vec3(*bvh.center.tolist())
     handle.extent = wp.vec3(*bvh.extent.tolist())
-    compressed = bvh.node_form == "compressed"
-    # In units, a node is larger than the least leaf, and none is met twice.
-    handle.step_limit = len(bvh.units) // (LEAST_COMPRESSED_WORDS // 8 if compressed else 5) + 1
+    compressed, double = bvh.node_form == "compressed", bvh.precision == "float64"
+    # In units, no node is met twice, nor is a leaf.
+    node = (COMPRESSED_NODE_WORDS if compressed else NODE_WORDS) // 8
+    block = BLOCK_WORDS // 4 if double else (LEAST_COMPRESSED_WORDS if compressed else BLOCK_WORDS) // 8
+    handle.step_limit = len(bvh.units) // min(node, block) + 1
     handle.stack = needed
     handle.accuracy = ACCURACIES.index(bvh.accuracy)
-    handle.compressed = int(compressed)
+    handle.refusal = FLOAT64 if double else COMPRESSED if compressed else 0
     stack = next(size for size in STACK_SIZES if size >= needed)
     return Tree(
         device=place,
@@ -103,6 +110,7 @@ def upload(bvh: _cpu.Bvh, device: wp.DeviceLike = None) -> Tree:
         error=error,
         stack=stack,
         nodes=bvh.node_form,
+        precision=bvh.precision,
     )
 
 

@@ -6,58 +6,52 @@ from types import SimpleNamespace
 # Warp compiles these functions: to mypy they are no Python.
 import warp as wp
 
-from wive.warp_kernels.frame import RayFrame, flip_sign
-from wive.warp_kernels.lanes import load_float, product, without_gradient
+from wive.warp_kernels.frame import FRAMES, flip_sign
+from wive.warp_kernels.lanes import without_gradient
+from wive.warp_kernels.precision import PRECISIONS, kept_numbers
 
-# What the test keeps of a ray behind the stack's entries: origin and direction.
+# What the test keeps of a ray behind the stack's entries, in float32: origin and direction.
 KEPT_WORDS = 6
 
 
-@wp.func
-def _cross(a: wp.vec3, b: wp.vec3):
-    return wp.vec3(
-        product(a[1], b[2]) - product(a[2], b[1]),
-        product(a[2], b[0]) - product(a[0], b[2]),
-        product(a[0], b[1]) - product(a[1], b[0]),
-    )
-
-
-@wp.func
-def _dot(a: wp.vec3, b: wp.vec3):
-    return product(a[0], b[0]) + product(a[1], b[1]) + product(a[2], b[2])
-
-
-def fast_triangles(lanes: SimpleNamespace, form: SimpleNamespace, kept: int) -> SimpleNamespace:
-    """The test for these lanes and blocks, its ray kept from word `kept` of the stack."""
+def fast_triangles(
+    lanes: SimpleNamespace, form: SimpleNamespace, kept: int, precision: str = "float32"
+) -> SimpleNamespace:
+    """The test for these lanes, blocks and numbers, its ray kept from word `kept` of the stack."""
     length: int = lanes.triangles_length
     vector, products = lanes.triangles, lanes.products
     load, edge, edge_at, used = form.load, form.edge, form.edge_at, form.used
     stride_of, vertex_at = form.stride, form.vertex_at
-    store_word, load_word, stack_argument = lanes.store_word, lanes.load_word, lanes.stack_argument
+    stack_argument, frame_type = lanes.stack_argument, FRAMES[precision]
+    numbers, ray_numbers = PRECISIONS[precision], kept_numbers(lanes, precision, kept)
+    real, vec3, product, load_number = numbers.real, numbers.vec3, numbers.product, numbers.load
+    store, kept_vector = ray_numbers.store, ray_numbers.load_vector
 
-    @without_gradient
     @wp.func
-    def prepare(ray: RayFrame, stack: stack_argument):
-        """Keep what the test needs of a ray."""
-        for axis in range(3):
-            store_word(stack, kept + axis, wp.cast(ray.origin[axis], wp.uint32))
-            store_word(stack, kept + 3 + axis, wp.cast(ray.direction[axis], wp.uint32))
-
-    @without_gradient
-    @wp.func
-    def kept_vector(stack: stack_argument, first: int):
-        """The three words from `first`: 0 for the origin, 3 for the direction."""
-        return wp.vec3(
-            wp.cast(load_word(stack, kept + first), wp.float32),
-            wp.cast(load_word(stack, kept + first + 1), wp.float32),
-            wp.cast(load_word(stack, kept + first + 2), wp.float32),
+    def cross(a: vec3, b: vec3):
+        return vec3(
+            product(a[1], b[2]) - product(a[2], b[1]),
+            product(a[2], b[0]) - product(a[0], b[2]),
+            product(a[0], b[1]) - product(a[1], b[0]),
         )
 
+    @wp.func
+    def dot(a: vec3, b: vec3):
+        return product(a[0], b[0]) + product(a[1], b[1]) + product(a[2], b[2])
+
     @without_gradient
     @wp.func
-    def edge_vector(units: wp.uint64, at: int, stride: int, v0: wp.vec3):
+    def prepare(ray: frame_type, stack: stack_argument):
+        """Keep what the test needs of a ray."""
+        for axis in range(3):
+            store(stack, axis, ray.origin[axis])
+            store(stack, 3 + axis, ray.direction[axis])
+
+    @without_gradient
+    @wp.func
+    def edge_vector(units: wp.uint64, at: int, stride: int, v0: vec3):
         """From v0 to the vertex at this word."""
-        return wp.vec3(
+        return vec3(
             edge_at(units, at, v0[0]),
             edge_at(units, at + stride, v0[1]),
             edge_at(units, at + 2 * stride, v0[2]),
@@ -69,19 +63,19 @@ def fast_triangles(lanes: SimpleNamespace, form: SimpleNamespace, kept: int) -> 
         """t, u and v of the block's triangle j, which the ray meets."""
         stride = stride_of(units, block)
         at = vertex_at(units, block, 0, j)
-        v0 = wp.vec3(
-            load_float(units, at), load_float(units, at + stride), load_float(units, at + 2 * stride)
+        v0 = vec3(
+            load_number(units, at), load_number(units, at + stride), load_number(units, at + 2 * stride)
         )
         e1 = edge_vector(units, vertex_at(units, block, 1, j), stride, v0)
         e2 = edge_vector(units, vertex_at(units, block, 2, j), stride, v0)
         d = kept_vector(stack, 3)
-        p = _cross(d, e2)
+        p = cross(d, e2)
         s = kept_vector(stack, 0) - v0
-        q = _cross(s, e1)
-        det = _dot(e1, p)
+        q = cross(s, e1)
+        det = dot(e1, p)
         size = wp.abs(det)
-        t = flip_sign(_dot(e2, wp.vec3(q[0] / size, q[1] / size, q[2] / size)), det)
-        return wp.vec3(t, flip_sign(_dot(s, p), det) / size, flip_sign(_dot(d, q), det) / size)
+        t = flip_sign(dot(e2, vec3(q[0] / size, q[1] / size, q[2] / size)), det)
+        return vec3(t, flip_sign(dot(s, p), det) / size, flip_sign(dot(d, q), det) / size)
 
     @without_gradient
     @wp.func
@@ -116,8 +110,14 @@ def fast_triangles(lanes: SimpleNamespace, form: SimpleNamespace, kept: int) -> 
             u = flip_sign(us[i], det[i])
             v = flip_sign(vs[i], det[i])
             # A determinant of zero (a ray in the triangle's plane) and NaN (an unused lane) must fail.
-            if u >= 0.0 and v >= 0.0 and u + v <= size and size > 0.0:
+            zero = real(0.0)
+            if u >= zero and v >= zero and u + v <= size and size > zero:
                 lanes = lanes | wp.uint32(1 << i)
         return wp.vec2ui(used(units, block, lane, lanes), wp.uint32(0))
 
     return SimpleNamespace(prepare=prepare, candidates=candidates, solve=solve)
+
+
+def double_triangles(lanes: SimpleNamespace, form: SimpleNamespace, kept: int) -> SimpleNamespace:
+    """The same of float64 trees."""
+    return fast_triangles(lanes, form, kept, "float64")

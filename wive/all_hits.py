@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wive.hits import surface_normals, surface_points
+from wive.precision import Floats
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -26,13 +27,15 @@ class AllHits:
         uv: (h,2) float32, the hit point is (1-u-v) v0 + u v1 + v v2.
         vertices: (v,3) float32 and
         faces: (f,3) int32, the mesh that `prim` refers to.
+
+    t, uv and vertices are float64 for a float64 scene.
     """
 
     offsets: NDArray[np.int64]
-    t: NDArray[np.float32]
+    t: Floats
     prim: NDArray[np.int32]
-    uv: NDArray[np.float32]
-    vertices: NDArray[np.float32]
+    uv: Floats
+    vertices: Floats
     faces: NDArray[np.int32]
 
     @property

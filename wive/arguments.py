@@ -7,6 +7,8 @@ from typing import Any, Literal, TypeGuard
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from wive.precision import FLOAT32, FLOAT64, Floats, Real, float32_or_refused, real_of
+
 Float32 = NDArray[np.float32]
 Int32 = NDArray[np.int32]
 Lanes = Literal[1, 8]
@@ -14,17 +16,6 @@ Lanes = Literal[1, 8]
 # More threads than this only cost memory; the core takes 32-bit counts.
 MOST_THREADS = 4096
 MOST_COUNT = 2**31 - 1
-FLOAT32 = np.dtype(np.float32)
-
-
-def _one(value: float) -> Float32:
-    array = np.array([value], np.float32)
-    array.flags.writeable = False
-    return array
-
-
-# The limits of most calls, made once: they are a third of the time that a call of one ray takes.
-COMMON_LIMITS = {value: _one(value) for value in (0.0, float("inf"))}
 
 
 def choice(name: str, value: object, allowed: Iterable[str]) -> None:
@@ -66,8 +57,11 @@ def vector(name: str, value: ArrayLike) -> NDArray[np.float64]:
     return array.astype(np.float64)
 
 
-def mesh(vertices: ArrayLike, faces: ArrayLike) -> tuple[Float32, Int32]:
-    """Vertices (v,3) float32 and faces (f,3) int32, C-contiguous; arrays that are so are not copied."""
+def mesh(vertices: ArrayLike, faces: ArrayLike, accuracy: str = "watertight") -> tuple[Floats, Int32]:
+    """Vertices (v,3) float32 or float64 and faces (f,3) int32, C-contiguous; such arrays are not copied.
+
+    Accuracy "exact" takes float32 numbers only.
+    """
     points = _positions(vertices)
     corners = _numeric("faces", faces, "an (f, 3) array of integers", "iu", "round them to integer indices")
     if corners.shape == (0,):
@@ -81,18 +75,21 @@ def mesh(vertices: ArrayLike, faces: ArrayLike) -> tuple[Float32, Int32]:
         raise ValueError(
             f"faces must index the {len(points)} vertices from 0, got {corners[face].tolist()} in face {face}"
         )
-    return _float32(points), np.require(corners, np.int32, ["C", "A"])
+    real = real_of(vertices)
+    if accuracy == "exact" and real is FLOAT64:
+        points, real = float32_or_refused(points), FLOAT32
+    return real.array(points), np.require(corners, np.int32, ["C", "A"])
 
 
-def moved_vertices(vertices: ArrayLike, count: int) -> Float32:
-    """New positions (count,3) float32, C-contiguous; an array that is so is not copied."""
+def moved_vertices(vertices: ArrayLike, count: int, real: Real) -> Floats:
+    """New positions (count,3) in the scene's dtype, C-contiguous; an array that is so is not copied."""
     points = _positions(vertices)
     if len(points) != count:
         raise ValueError(
             f"vertices must have shape ({count}, 3), as the scene's own, got {points.shape}: "
             "make a new Scene for another mesh"
         )
-    return _float32(points)
+    return real.array(points)
 
 
 def read_only(array: NDArray[Any]) -> NDArray[Any]:
@@ -103,14 +100,15 @@ def read_only(array: NDArray[Any]) -> NDArray[Any]:
 
 
 def rays(
-    origins: ArrayLike, directions: ArrayLike, tmin: ArrayLike, tmax: ArrayLike
-) -> tuple[Float32, Float32, Float32, Float32]:
-    """Origins and directions (n,3) float32, tmin and tmax (1,) or (n,) float32, all C-contiguous.
+    origins: ArrayLike, directions: ArrayLike, tmin: ArrayLike, tmax: ArrayLike, real: Real = FLOAT32
+) -> tuple[Floats, Floats, Floats, Floats]:
+    """Origins and directions (n,3), tmin and tmax (1,) or (n,), all C-contiguous and of `real`'s dtype.
 
     A vector of shape (3,) is that of every ray.
     """
-    origin_rows = origins if _is_ready(origins) else _vectors("origins", origins)
-    direction_rows = directions if _is_ready(directions) else _vectors("directions", directions)
+    dtype = real.dtype
+    origin_rows = origins if _is_ready(origins, dtype) else _vectors("origins", origins, real)
+    direction_rows = directions if _is_ready(directions, dtype) else _vectors("directions", directions, real)
     if origin_rows.ndim == direction_rows.ndim == 1:
         origin_rows, direction_rows = origin_rows[None], direction_rows[None]
     elif origin_rows.ndim == 1:
@@ -122,12 +120,15 @@ def rays(
         raise ValueError(
             f"origins and directions must be equally many, got {count} and {len(direction_rows)}"
         )
-    return origin_rows, direction_rows, limits("tmin", tmin, count), limits("tmax", tmax, count)
+    common = real.limits  # looked up here, as a call of one ray spends most of its time in calls
+    low = common[tmin] if type(tmin) is float and tmin in common else limits("tmin", tmin, count, real)
+    high = common[tmax] if type(tmax) is float and tmax in common else limits("tmax", tmax, count, real)
+    return origin_rows, direction_rows, low, high
 
 
-def directions(value: ArrayLike, count: int) -> Float32:
-    """The directions of `count` rays, (count,3) float32, C-contiguous unless all share one."""
-    rows = value if _is_ready(value) else _vectors("directions", value)
+def directions(value: ArrayLike, count: int, real: Real = FLOAT32) -> Floats:
+    """The directions of `count` rays, (count,3) of `real`'s dtype, C-contiguous unless all share one."""
+    rows = value if _is_ready(value, real.dtype) else _vectors("directions", value, real)
     if rows.ndim == 1:
         return np.broadcast_to(rows, (count, 3))
     if len(rows) != count:
@@ -149,6 +150,8 @@ def in_flight(value: int | None) -> int:
 
 def work(asked_threads: int | None, asked_in_flight: int | None, stats: bool) -> tuple[int, int, bool]:
     """How the core is to trace: threads, rays in flight, whether to count."""
+    if asked_threads is None and asked_in_flight is None:
+        return 0, 0, bool(stats)
     return threads(asked_threads), in_flight(asked_in_flight), bool(stats)
 
 
@@ -163,23 +166,23 @@ def lanes(value: object, on_warp: bool) -> Lanes | None:
     return 8 if value == 8 else 1
 
 
-def limits(name: str, value: ArrayLike, count: int) -> Float32:
-    """The limits of `count` rays, (1,) or (count,) float32."""
-    if type(value) is float and value in COMMON_LIMITS:
-        return COMMON_LIMITS[value]
+def limits(name: str, value: ArrayLike, count: int, real: Real = FLOAT32) -> Floats:
+    """The limits of `count` rays, (1,) or (count,) of `real`'s dtype."""
+    if type(value) is float and value in real.limits:
+        return real.limits[value]
     array = _numeric(name, value, "a real number or one per ray", "fiu")
     if array.shape not in ((), (count,)):
         raise ValueError(
             f"{name} must be one number or have shape ({count},), one a ray, got shape {array.shape}"
         )
-    return _float32(array.reshape(-1))
+    return real.array(array.reshape(-1))
 
 
-def _is_ready(value: ArrayLike) -> TypeGuard[Float32]:
+def _is_ready(value: ArrayLike, dtype: np.dtype[Any]) -> TypeGuard[Floats]:
     """Whether it is an (n,3) array as the core takes it: checks are most of a small call."""
     return (
         type(value) is np.ndarray
-        and value.dtype is FLOAT32
+        and value.dtype is dtype
         and value.ndim == 2
         and value.shape[1] == 3
         and (flags := value.flags).c_contiguous
@@ -196,13 +199,13 @@ def _positions(vertices: ArrayLike) -> NDArray[Any]:
     return points
 
 
-def _vectors(name: str, value: ArrayLike) -> Float32:
+def _vectors(name: str, value: ArrayLike, real: Real) -> Floats:
     array = _numeric(name, value, "an (n, 3) array of real numbers", "fiu")
     if array.shape == (0,):
         array = array.reshape(0, 3)
     if array.ndim not in (1, 2) or array.shape[-1] != 3:
         raise ValueError(f"{name} must have shape (n, 3), or (3,) if all rays share it, got {array.shape}")
-    return _float32(array)
+    return real.array(array)
 
 
 def _numeric(
@@ -215,13 +218,6 @@ def _numeric(
     if array.dtype.kind not in kinds and array.shape != (0,):
         raise TypeError(f"{name} must be {expected}, got dtype {array.dtype}: {mend}")
     return array
-
-
-def _float32(array: NDArray[Any]) -> Float32:
-    if array.dtype is FLOAT32 and array.flags.c_contiguous and array.flags.aligned:
-        return array
-    with np.errstate(over="ignore"):
-        return np.require(array, np.float32, ["C", "A"])
 
 
 def _described(value: object) -> str:

@@ -98,7 +98,10 @@ class WarpArrays(_OnWarpStream):
         """On Warp's CPU device."""
         import warp as wp
 
-        vectors = {(2, "float32"): wp.vec2, (3, "float32"): wp.vec3, (3, "float64"): wp.vec3d}
+        vectors = {
+            (2, "float32"): wp.vec2, (3, "float32"): wp.vec3,
+            (2, "float64"): wp.vec2d, (3, "float64"): wp.vec3d,
+        }  # fmt: skip
         as_vectors = array.ndim == 2 and self.vectors
         dtype = {"dtype": vectors[array.shape[1], array.dtype.name]} if as_vectors else {}
         return wp.array(array, device="cpu", copy=False, **dtype)
@@ -235,7 +238,7 @@ def library_of(value: Any) -> Library:
         return NUMPY
     torch, warp = sys.modules.get("torch"), sys.modules.get("warp")
     if warp is not None and isinstance(value, warp.array):
-        return WARP_VECTORS if value.dtype is warp.vec3 else WARP_NUMBERS
+        return WARP_VECTORS if value.dtype in (warp.vec3, warp.vec3d) else WARP_NUMBERS
     if torch is not None and isinstance(value, torch.Tensor):
         return TORCH
     if hasattr(value, "__dlpack__"):

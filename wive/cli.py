@@ -106,6 +106,7 @@ def _add_trace(subparsers: "argparse._SubParsersAction[_Parser]") -> None:
     parser.add_argument("-o", "--output", required=True, metavar="NPZ", help="hits to write")
     parser.add_argument("--all", action="store_true", help="every hit of each ray; writes offsets, too")
     _add_scene_options(parser)
+    _add_precision(parser)
     parser.set_defaults(run=commands.trace_rays)
 
 
@@ -117,6 +118,7 @@ def _add_info(subparsers: "argparse._SubParsersAction[_Parser]") -> None:
     )
     parser.add_argument("mesh", metavar="MESH", help="mesh file")
     _add_scene_options(parser, threads=False)
+    _add_precision(parser)
     parser.set_defaults(run=commands.describe_mesh)
 
 
@@ -127,3 +129,12 @@ def _add_scene_options(parser: argparse.ArgumentParser, threads: bool = True) ->
     parser.add_argument("--nodes", default="float32", help="float32 or compressed")
     if threads:
         parser.add_argument("--threads", type=int, help="default: every core")
+
+
+def _add_precision(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--precision",
+        choices=("float32", "float64"),
+        default="float32",
+        help="of coordinates and t; float64 where the file has them finer",
+    )

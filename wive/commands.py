@@ -16,6 +16,7 @@ from wive.files import atomic_write, check_output
 from wive.hits import Hits
 from wive.meshfile import load_mesh
 from wive.npzfile import check_input, read_npy_or_npz
+from wive.precision import Floats, Real, real_named
 from wive.progress import progress_bar
 from wive.rendering import Settings, check_png_output, render_counted, write_png
 from wive.scene import Scene
@@ -43,8 +44,8 @@ def trace_rays(options: Namespace) -> None:
     """`wive trace`: closest hits, or all, of a file of rays into an npz file."""
     output = check_output(options.output, ".npz")
     check_input(options.rays)
-    scene = _scene(options, *load_mesh(options.mesh))
-    origins, directions, tmin, tmax = _read_rays(options.rays)
+    scene = _scene(options, *load_mesh(options.mesh, options.precision))
+    origins, directions, tmin, tmax = _read_rays(options.rays, real_named(options.precision))
     count = len(origins)
     query = scene.intersect_all if options.all else scene.intersect
     found: list[Hits | AllHits] = []
@@ -76,11 +77,12 @@ def trace_rays(options: Namespace) -> None:
 
 def describe_mesh(options: Namespace) -> None:
     """`wive info`: the mesh and the tree over it."""
-    vertices, faces = load_mesh(options.mesh)
+    vertices, faces = load_mesh(options.mesh, options.precision)
     begin = time.perf_counter()
     scene = _scene(options, vertices, faces)
     seconds = time.perf_counter() - begin
-    low, high = (" ".join(f"{value:g}" for value in corner) for corner in scene.bounds)
+    digits = "g" if scene.precision == "float32" else ".12g"
+    low, high = (" ".join(f"{value:{digits}}" for value in corner) for corner in scene.bounds)
     tree = scene._bvh
     node_cost, triangle_cost = tree.sah
     for name, value in (
@@ -89,6 +91,7 @@ def describe_mesh(options: Namespace) -> None:
         ("bounds", f"{low} to {high}"),
         ("backend", _tracer(scene)),
         ("accuracy", scene.accuracy),
+        ("precision", scene.precision),
         ("nodes", f"{len(tree.nodes):,}"),
         ("form", f"{scene.nodes} nodes"),
         ("depth", f"{tree.depth}"),
@@ -146,7 +149,7 @@ def _camera(options: Namespace, scene: Scene) -> Camera:
     )
 
 
-def _read_rays(name: str) -> tuple[NDArray[np.float32], ...]:
+def _read_rays(name: str, real: Real) -> tuple[Floats, ...]:
     """Origins, directions, tmin and tmax as `Scene.intersect` uses them."""
     expected = "a file of rays, (n,6) or (n,8) in an .npy or `origins` and `directions` in an .npz"
     loaded = read_npy_or_npz(name, expected)
@@ -161,7 +164,8 @@ def _read_rays(name: str) -> tuple[NDArray[np.float32], ...]:
         limits = [loaded[:, 6], loaded[:, 7]] if loaded.shape[1] == 8 else [0.0, np.inf]
         columns = [loaded[:, :3], loaded[:, 3:6], *limits]
     try:
-        return checked_rays(*columns)
+        origins, directions, tmin, tmax = columns
+        return checked_rays(origins, directions, tmin, tmax, real)
     except (TypeError, ValueError) as error:
         raise ValueError(f"{name}: {error}") from error
 

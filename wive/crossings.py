@@ -9,6 +9,7 @@ from wive import _cpu, arguments
 from wive.all_hits import AllHits, WrappedAllHits
 from wive.arrays import NUMPY
 from wive.hits import Stats, stats_of
+from wive.precision import Real
 from wive.rays import check_rays
 
 if TYPE_CHECKING:
@@ -22,6 +23,7 @@ class CrossingQueries:
 
     _bvh: _cpu.Bvh
     _faces: NDArray[np.int32]
+    _real: Real
     _backend: str
     _device: str | None
     _warp: "WarpTracer | None"
@@ -71,8 +73,9 @@ class CrossingQueries:
         Not so with accuracy "exact": there a ray passes a closed surface as often as beside the edge, so that
         parity is always right, and a hit of `intersect` that only touches an edge may be missing.
 
-        CPU backends trace once; a hit takes 24 bytes until all are found, then 16. Warp traces twice, to
-        count and to fill, and waits for the device in between: CUDA graphs can't capture this query.
+        CPU backends trace once; a hit takes 24 bytes until all are found, then 16 (in float64 40, then 28).
+        Warp traces twice, to count and to fill, and waits for the device in between: CUDA graphs can't
+        capture this query.
 
         Raises ValueError or TypeError, in one line naming the argument, and MemoryError where the hits don't
         fit into memory (on a Warp device that is full, RuntimeError).
@@ -85,7 +88,7 @@ class CrossingQueries:
             hits, counts = self._warp.intersect_all(rays, chosen, bool(stats))
         else:
             bvh = self._bvh
-            offsets, t, prim, uv, table = bvh.intersect_all(self._backend, *rays.numpy(), *work)
+            offsets, t, prim, uv, table = bvh.intersect_all(self._backend, *rays.numpy(self._real), *work)
             hits = AllHits(offsets, t, prim, uv, bvh.vertices, self._faces)
             counts = stats_of(table, rays.library)
             if rays.library is not NUMPY:
@@ -139,6 +142,6 @@ class CrossingQueries:
         if self._warp is not None:
             counted, steps = self._warp.count(rays, chosen, bool(stats))
         else:
-            found, table = self._bvh.count(self._backend, *rays.numpy(), *work)
+            found, table = self._bvh.count(self._backend, *rays.numpy(self._real), *work)
             counted, steps = rays.library.from_numpy(found), stats_of(table, rays.library)
         return counted if steps is None else (counted, steps)

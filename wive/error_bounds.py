@@ -5,35 +5,41 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from wive.precision import Floats
+
 Float64 = NDArray[np.float64]
 
 UNIT_ROUNDOFF = 2.0**-53  # of double
 # A term of the residual is rounded at most nine times; three more are for the bound's own rounding.
 ROUNDINGS = 12
+# What products of doubles lose below the smallest normal one, all together; those of float32 lose nothing.
+UNDERFLOW = 2.0**-1070
 BLOCK_ROWS = 1 << 15  # rows taken at once: what they need in between stays in cache
 
 
 def t_error_bounds(
-    vertices: NDArray[np.float32],
+    vertices: Floats,
     faces: NDArray[np.int32],
     prim: NDArray[np.int32],
-    t: NDArray[np.float32],
-    origins: NDArray[np.float32],
-    directions: NDArray[np.float32],
+    t: Floats,
+    origins: Floats,
+    directions: Floats,
 ) -> Float64:
     """(n,) bounds on the distance of t (n,) from where rays meet the planes of triangles prim (n,).
 
-    NaN where prim is negative.
+    NaN where prim is negative. Vertices and rays are float32, or all float64.
     """
     bounds = np.full(len(prim), np.nan)
+    underflow = UNDERFLOW if vertices.dtype == np.float64 else 0.0
     for rows in blocks_of_hits(prim):
         corners = corner_rows(vertices, faces, prim[rows])
-        ray = (array[rows].astype(np.float64).T for array in (origins, directions))
-        bounds[rows] = _bounds(corners, t[rows].astype(np.float64), *ray)
+        origin, direction = (array[rows].astype(np.float64).T for array in (origins, directions))
+        with np.errstate(all="ignore"):
+            bounds[rows] = _bounds(corners, t[rows].astype(np.float64), origin, direction, underflow)
     return bounds
 
 
-def _bounds(corners: Float64, t: Float64, origin: Float64, direction: Float64) -> Float64:
+def _bounds(corners: Float64, t: Float64, origin: Float64, direction: Float64, underflow: float) -> Float64:
     """Of corners (3,3,h), t (h,), origin and direction (3,h)."""
     v0, v1, v2 = corners
     first, second, away = v1 - v0, v2 - v0, v0 - origin
@@ -41,9 +47,11 @@ def _bounds(corners: Float64, t: Float64, origin: Float64, direction: Float64) -
     height, slope = dot(normal, away), dot(normal, direction)
     height_error = ROUNDINGS * UNIT_ROUNDOFF * dot(size, abs(away))
     slope_error = ROUNDINGS * UNIT_ROUNDOFF * dot(size, abs(direction))
-    with np.errstate(all="ignore"):
-        residual = abs(t * slope - height) + (height_error + abs(t) * slope_error)
-        bounds = residual / (abs(slope) - slope_error) * (1 + 8 * UNIT_ROUNDOFF)
+    if underflow:
+        height_error += underflow * (1 + abs(away).sum(axis=0))
+        slope_error += underflow * (1 + abs(direction).sum(axis=0))
+    residual = abs(t * slope - height) + (height_error + abs(t) * slope_error)
+    bounds = residual / (abs(slope) - slope_error) * (1 + 8 * UNIT_ROUNDOFF) + underflow
     return np.where((abs(slope) > slope_error) & np.isfinite(t), bounds, np.inf)
 
 
@@ -54,7 +62,7 @@ def blocks_of_hits(prim: NDArray[np.int32]) -> Iterator[NDArray[np.intp]]:
         yield hits[first : first + BLOCK_ROWS]
 
 
-def corner_rows(vertices: NDArray[np.float32], faces: NDArray[np.int32], prim: NDArray[np.int32]) -> Float64:
+def corner_rows(vertices: Floats, faces: NDArray[np.int32], prim: NDArray[np.int32]) -> Float64:
     """(3,3,h): corner by corner, then axis by axis, of triangles prim (h,)."""
     return vertices[faces[prim]].astype(np.float64).transpose(1, 2, 0)
 

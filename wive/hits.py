@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from wive import _cpu, arguments
 from wive.arrays import Library, host_array
 from wive.error_bounds import t_error_bounds
+from wive.precision import Floats, real_of
 from wive.rays import Rays
 from wive.spawn import spawn_origins
 
@@ -30,14 +31,14 @@ def stats_of(table: NDArray[np.int32] | None, library: Library) -> Stats | None:
 
 
 def surface_points(
-    vertices: NDArray[np.float32], faces: NDArray[np.int32], prim: NDArray[np.int32], uv: NDArray[np.float32]
+    vertices: Floats, faces: NDArray[np.int32], prim: NDArray[np.int32], uv: Floats
 ) -> NDArray[np.float64]:
     """(h,3) points at uv (h,2) of triangles prim (h,); NaN where prim is -1."""
     return _cpu.surface_points(vertices, faces, np.ascontiguousarray(prim), np.ascontiguousarray(uv))
 
 
 def surface_normals(
-    vertices: NDArray[np.float32], faces: NDArray[np.int32], prim: NDArray[np.int32]
+    vertices: Floats, faces: NDArray[np.int32], prim: NDArray[np.int32]
 ) -> NDArray[np.float64]:
     """(h,3) unit normals of triangles prim (h,), by the right-hand winding; NaN where prim is -1."""
     return _cpu.surface_normals(vertices, faces, np.ascontiguousarray(prim))
@@ -56,12 +57,14 @@ class Hits:
         uv: (n,2) float32, the hit point is (1-u-v) v0 + u v1 + v v2; NaN on a miss.
         vertices: (v,3) float32 and
         faces: (f,3) int32, the mesh that `prim` refers to.
+
+    t, uv and vertices are float64 for a float64 scene.
     """
 
-    t: NDArray[np.float32]
+    t: Floats
     prim: NDArray[np.int32]
-    uv: NDArray[np.float32]
-    vertices: NDArray[np.float32]
+    uv: Floats
+    vertices: Floats
     faces: NDArray[np.int32]
     # Only kept for what is asked later: class variables to the dataclass, which would make fields of them.
     _rays: ClassVar[Rays | None]
@@ -69,10 +72,10 @@ class Hits:
 
     def __init__(
         self,
-        t: NDArray[np.float32],
+        t: Floats,
         prim: NDArray[np.int32],
-        uv: NDArray[np.float32],
-        vertices: NDArray[np.float32],
+        uv: Floats,
+        vertices: Floats,
         faces: NDArray[np.int32],
         rays: Rays | None = None,
         accuracy: str = "",
@@ -106,29 +109,30 @@ class Hits:
     def error_bound(self) -> NDArray[np.float64]:
         """(n,) float64: t is at most so far from where the ray meets the plane of the triangle hit.
 
-        That is in exact arithmetic on the float32 rays and vertices, in the unit of t; proved for every
-        accuracy, docs/accuracy.md, "The error of t". inf where double can't tell the ray from one in the
-        plane, NaN on a miss. In float64, because what remains after t was rounded to float32 is far below
-        what a float32 of that size resolves.
+        That is in exact arithmetic on rays and vertices in the scene's precision, in the unit of t; proved
+        for every accuracy, docs/accuracy.md, "The error of t". inf where double can't tell the ray from one
+        in the plane, NaN on a miss. In float64, because what remains after t was rounded to float32 is far
+        below what a float32 of that size resolves. For float64 scenes most of it is the error that judging
+        in double may have made: some 25 units in the last place of t where that is well-conditioned.
 
         Computed at each call, from the arrays that held the rays: it is wrong if you have changed them.
         """
         if self._rays is None:
             raise ValueError("error_bound needs hits that a scene returned: these were made without rays")
-        origins, directions, *_ = self._rays.numpy()
+        origins, directions, *_ = self._rays.numpy(real_of(self.vertices))
         return t_error_bounds(self.vertices, self.faces, self.prim, self.t, origins, directions)
 
-    def spawn(self, directions: ArrayLike) -> NDArray[np.float32]:
-        """(n,3) float32 origins for rays that leave the surface from the points hit; NaN on a miss.
+    def spawn(self, directions: ArrayLike) -> Floats:
+        """(n,3) origins for rays that leave the surface from the points hit; NaN on a miss.
 
-        Each lies on the side of its triangle that its direction points to, just far enough that a ray from
-        there with tmin = 0 doesn't hit this triangle in a scene of the same accuracy; docs/accuracy.md,
-        "Spawned rays", has the proof, and what holds for neighbours. All directions to one side have the
-        same origin. Rays from the NaN of a miss miss.
+        float32, or float64 for a float64 scene. Each lies on the side of its triangle that its direction
+        points to, just far enough that a ray from there with tmin = 0 doesn't hit this triangle in a scene of
+        the same accuracy and precision; docs/accuracy.md, "Spawned rays", has the proof, and what holds for
+        neighbours. All directions to one side have the same origin. Rays from the NaN of a miss miss.
 
         Arguments:
-            directions: (n,3) real numbers, used as float32, or (3,) for all; of any length. On a Warp
-                device, as `Scene.intersect` takes them.
+            directions: (n,3) real numbers, used in the scene's precision, or (3,) for all; of any length. On
+                a Warp device, as `Scene.intersect` takes them.
 
         Raises ValueError or TypeError, in one line naming the argument.
 
@@ -136,7 +140,8 @@ class Hits:
         """
         if not self._accuracy:
             raise ValueError("spawn needs hits that a scene returned: these were made without an accuracy")
-        rows = arguments.directions(host_array("directions", directions), len(self))
+        given = host_array("directions", directions)
+        rows = arguments.directions(given, len(self), real_of(self.vertices))
         return spawn_origins(self.vertices, self.faces, self.prim, self.uv, rows, self._accuracy)
 
     def __len__(self) -> int:
@@ -179,7 +184,7 @@ class WrappedHits(Hits):
         return self._wrap(self._home.error_bound)
 
     def spawn(self, directions: ArrayLike) -> Any:
-        """(n,3) float32 origins, as `Hits.spawn`."""
+        """(n,3) origins, as `Hits.spawn`."""
         return self._wrap(self._home.spawn(directions))
 
     def __len__(self) -> int:

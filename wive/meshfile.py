@@ -4,21 +4,29 @@ import os
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import DTypeLike, NDArray
 
 from wive.files import PathLike
 from wive.npzfile import check_input, read_npz
+from wive.precision import real_named
 
 
-def load_mesh(path: PathLike) -> tuple[NDArray[np.floating[Any]], NDArray[np.integer[Any]]]:
+def load_mesh(
+    path: PathLike, dtype: DTypeLike = np.float32
+) -> tuple[NDArray[np.floating[Any]], NDArray[np.integer[Any]]]:
     """Vertices (v,3) and faces (f,3) of a mesh file, in the file's own order, nothing merged or dropped.
 
-    An .npz file gives its arrays `vertices` and `faces` as they are. Any other file is read by trimesh, with
-    float64 vertices; the meshes of a file that holds a scene are placed and joined.
+    An .npz file gives its arrays `vertices` and `faces`. Any other file is read by trimesh; the meshes of a
+    file that holds a scene are placed and joined.
+
+    Arguments:
+        dtype: of the vertices, np.float32 or np.float64. Few files hold more than float32; coordinates as of
+            surveys do, and a `Scene` over them as float64 keeps it.
 
     Raises OSError where the file can't be read, ValueError where it is no mesh or has no triangles,
     ImportError where trimesh is missing. Each message is one line that names the file.
     """
+    real = real_named(dtype)
     name = check_input(path)
     if name.lower().endswith(".npz"):
         arrays = read_npz(name, "an npz file of arrays `vertices` and `faces`")
@@ -30,7 +38,8 @@ def load_mesh(path: PathLike) -> tuple[NDArray[np.floating[Any]], NDArray[np.int
         vertices, faces = _load_with_trimesh(name)
     if faces.size == 0:
         raise ValueError(f"{name}: has no triangles")
-    return vertices, faces
+    is_real = vertices.dtype.kind in "fiu"  # what is not, a Scene refuses
+    return real.array(vertices) if is_real else vertices, faces
 
 
 def _load_with_trimesh(name: str) -> tuple[NDArray[Any], NDArray[Any]]:

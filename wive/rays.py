@@ -4,11 +4,13 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from wive import arguments
-from wive.arguments import Float32
 from wive.arrays import NUMPY, NUMPY_TYPES, Library, WarpArrays, library_of
+from wive.precision import FLOAT32, Real
+
+FourArrays = tuple[NDArray[Any], NDArray[Any], NDArray[Any], NDArray[Any]]
 
 
 class Rays(NamedTuple):
@@ -20,15 +22,16 @@ class Rays(NamedTuple):
     tmax: Any
     library: Library
 
-    def numpy(self) -> tuple[Float32, Float32, Float32, Float32]:
+    def numpy(self, real: Real = FLOAT32) -> FourArrays:
         """Origins, directions, tmin and tmax as the core takes them; memory is shared where it can be."""
         if self.library is NUMPY:
-            return arguments.rays(self.origins, self.directions, self.tmin, self.tmax)
+            return arguments.rays(self.origins, self.directions, self.tmin, self.tmax, real)
 
         def host(value: Any) -> Any:
             return library_of(value).to_numpy(value)
 
-        return arguments.rays(host(self.origins), host(self.directions), host(self.tmin), host(self.tmax))
+        origins, directions = host(self.origins), host(self.directions)
+        return arguments.rays(origins, directions, host(self.tmin), host(self.tmax), real)
 
 
 def check_rays(

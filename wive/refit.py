@@ -7,6 +7,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from wive import _cpu, arguments
 from wive.arrays import host_array
+from wive.precision import Floats, Real
 
 if TYPE_CHECKING:
     from wive.warp_tracer import WarpTracer
@@ -18,9 +19,10 @@ class Refittable:
     _bvh: _cpu.Bvh
     _warp: "WarpTracer | None"
     _faces: NDArray[np.int32]
+    _real: Real
 
     @property
-    def _vertices(self) -> NDArray[np.float32]:
+    def _vertices(self) -> Floats:
         return self._bvh.vertices
 
     def refit(self, vertices: ArrayLike) -> None:
@@ -37,13 +39,13 @@ class Refittable:
         that ends last counts.
 
         Arguments:
-            vertices: (v,3) real numbers, as many as before, used as float32. A C-contiguous float32 array is
-                kept, not copied, and may be the scene's own, changed in place; points and normals of earlier
-                hits follow it then.
+            vertices: (v,3) real numbers, as many as before, used in the scene's precision. A C-contiguous
+                array of that dtype is kept, not copied, and may be the scene's own, changed in place; points
+                and normals of earlier hits follow it then.
 
         Raises ValueError or TypeError as construction does, and leaves the scene as it was.
         """
-        points = arguments.moved_vertices(host_array("vertices", vertices), len(self._vertices))
+        points = arguments.moved_vertices(host_array("vertices", vertices), len(self._vertices), self._real)
         bvh = self._bvh.refitted(arguments.read_only(points))
         if self._warp is not None:
             self._warp = type(self._warp)(bvh, bvh.vertices, self._faces, self._warp.device)

@@ -71,7 +71,7 @@ def render(
         progress: show a progress bar on stderr (needs tqdm).
 
     Returns (height, width, 3) float32 linear radiance, top row first. Raises ValueError that names a bad
-    argument.
+    argument, such as a float64 scene: only float32 scenes are rendered.
     """
     settings = Settings(
         width=width, height=height, spp=spp, bounces=bounces, albedo=albedo, seed=seed, threads=threads
@@ -83,6 +83,11 @@ def render_counted(
     scene: Scene, camera: Camera | None, settings: Settings, *, progress: bool
 ) -> tuple[Image, int]:
     """The picture as `render` returns it, and how many rays were traced for it."""
+    if scene.precision != "float32":
+        raise ValueError(
+            "scene must be of float32 vertices to be rendered, got float64: "
+            "make one with (vertices - vertices.mean(axis=0)).astype(np.float32)"
+        )
     width, height = settings.width, settings.height
     if camera is None:
         camera = Camera.framing(scene.bounds, aspect=width / height)

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Literal, overload
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from wive import _cpu, arguments
 from wive.arrays import NUMPY, host_array
@@ -13,16 +13,17 @@ from wive.crossings import CrossingQueries, LanesOption
 from wive.files import PathLike
 from wive.hits import Hits, Stats, WrappedHits, stats_of
 from wive.meshfile import load_mesh
+from wive.precision import FLOAT32, Floats, real_of
+from wive.properties import SceneProperties
 from wive.rays import check_rays
 from wive.refit import Refittable
 from wive.storage import Options, read_scene, write_scene
 
 if TYPE_CHECKING:
-    from wive.warp_kernels import Tree
     from wive.warp_tracer import WarpTracer
 
 
-class Scene(Refittable, CrossingQueries):
+class Scene(Refittable, CrossingQueries, SceneProperties):
     """A triangle mesh that answers ray queries.
 
     Several threads may query it at once, and so may processes forked from this one. Only `refit` changes it,
@@ -45,22 +46,24 @@ class Scene(Refittable, CrossingQueries):
         """Build the tree.
 
         Arguments:
-            vertices: (v,3) real numbers, used as float32.
+            vertices: (v,3) real numbers. An array of float64 makes a float64 scene: vertices, rays, t and uv
+                are float64, for coordinates such as surveys'. All else, lists too, is used as float32.
             faces: (f,3) integers, three vertices a triangle, counter-clockwise as seen from the side that its
                 normal points to. Zero-area triangles keep their number and are never hit.
             backend: "auto" (the fastest CPU backend this machine has) or a name in `wive.backends()`.
             device: where backend "warp" traces, by Warp's names: "cpu", "cuda:0", ...; None is the first CUDA
                 device, else "cpu". A device alone implies backend "warp"; CPU backends take none.
             accuracy: "watertight" (rays never slip between triangles that share an edge or vertex), "fast",
-                or "exact" (hits, their order, t and uv are those of exact arithmetic, rounded once).
+                or "exact" (hits, their order, t and uv are those of exact arithmetic, rounded once; float32
+                numbers only, whatever their dtype).
             nodes: "float32", or "compressed": the same hits, under two thirds the bytes, for large trees.
             quality: "medium", or "high" for a tree that takes about four times as long to build and gives
                 the same hits in fewer steps: a sixth fewer where sizes differ much, none in even meshes.
 
-        C-contiguous float32 vertices and int32 faces are kept, not copied: don't change them afterwards.
+        C-contiguous float32 or float64 vertices and int32 faces are kept, not copied: don't change them.
 
         Raises ValueError or TypeError, in one line naming the argument, and the index of a vertex that is NaN
-        or infinite or of a face out of range.
+        or infinite, or that "exact" would have to round, or of a face out of range.
         """
         arguments.choice("accuracy", accuracy, ("fast", "watertight", "exact"))
         arguments.choice("nodes", nodes, ("float32", "compressed"))
@@ -69,8 +72,9 @@ class Scene(Refittable, CrossingQueries):
             backend=backend, device=device, accuracy=accuracy, nodes=nodes, quality=quality
         )
         self._backend, self._device = resolve_backend(backend, device)
-        mesh = arguments.mesh(host_array("vertices", vertices), host_array("faces", faces))
+        mesh = arguments.mesh(host_array("vertices", vertices), host_array("faces", faces), accuracy)
         vertices, self._faces = map(arguments.read_only, mesh)
+        self._real = real_of(vertices)
         self._bvh = _cpu.Bvh(vertices, self._faces, accuracy, nodes=nodes, quality=quality)
         if self._device is not None:
             from wive.warp_tracer import WarpTracer
@@ -78,9 +82,9 @@ class Scene(Refittable, CrossingQueries):
             self._warp = WarpTracer(self._bvh, vertices, self._faces, self._device)
 
     @classmethod
-    def from_file(cls, path: PathLike, **kwargs: Any) -> "Scene":
-        """A scene from a mesh file, read by `wive.load_mesh`; keywords are those of `Scene`."""
-        return cls(*load_mesh(path), **kwargs)
+    def from_file(cls, path: PathLike, *, dtype: DTypeLike = np.float32, **kwargs: Any) -> "Scene":
+        """A scene from a mesh file, read by `wive.load_mesh` in that dtype; keywords are those of `Scene`."""
+        return cls(*load_mesh(path, dtype), **kwargs)
 
     @overload
     def intersect(
@@ -124,10 +128,10 @@ class Scene(Refittable, CrossingQueries):
 
         Arguments:
             origins, directions: (n,3) real numbers; one of shape (3,) is shared by all rays. C-contiguous
-                float32 arrays are not copied, others are converted once. Directions may have any length.
-                Warp, torch and DLPack arrays give hits in arrays of their library, on their device, without
-                passing through the host; for a Warp scene they must lie on its device and be float32. No call
-                waits for the GPU then: with Warp's memory pools on, CUDA graphs can capture it.
+                arrays of the scene's dtype are not copied, others are converted once. Directions may have any
+                length. Warp, torch and DLPack arrays give hits in arrays of their library, on their device,
+                without passing through the host; for a Warp scene they must lie on its device and have its
+                dtype. No call waits for the GPU then: with Warp's memory pools, CUDA graphs can capture it.
             tmin, tmax: a number, or (n,) one a ray, in multiples of the direction's length.
             threads: how many to use; None is every core. For CPU backends.
             in_flight: rays interleaved per thread; None leaves it to wive, 1 is plain single-ray traversal.
@@ -150,7 +154,7 @@ class Scene(Refittable, CrossingQueries):
             hits, counts = self._warp.intersect(rays, chosen, bool(stats))
         else:
             bvh = self._bvh
-            t, prim, uv, table = bvh.intersect(self._backend, *rays.numpy(), *work)
+            t, prim, uv, table = bvh.intersect(self._backend, *rays.numpy(self._real), *work)
             hits = Hits(t, prim, uv, bvh.vertices, self._faces, rays, self._options["accuracy"])
             counts = stats_of(table, rays.library)
             if rays.library is not NUMPY:
@@ -203,7 +207,7 @@ class Scene(Refittable, CrossingQueries):
         if self._warp is not None:
             mask, counts = self._warp.occluded(rays, chosen, bool(stats))
         else:
-            found, table = self._bvh.occluded(self._backend, *rays.numpy(), *work)
+            found, table = self._bvh.occluded(self._backend, *rays.numpy(self._real), *work)
             mask, counts = rays.library.from_numpy(found), stats_of(table, rays.library)
         return mask if counts is None else (mask, counts)
 
@@ -211,63 +215,10 @@ class Scene(Refittable, CrossingQueries):
         """Write the scene to a file that `wive.load` reads; the file is whole or absent."""
         write_scene(path, self._vertices, self._faces, self._options)
 
-    @property
-    def vertices(self) -> NDArray[np.float32]:
-        """(v,3) float32, read-only."""
-        return self._vertices
-
-    @property
-    def faces(self) -> NDArray[np.int32]:
-        """(f,3) int32, read-only."""
-        return self._faces
-
-    @property
-    def bounds(self) -> NDArray[np.float32]:
-        """(2,3) float32 lowest and highest corner of the triangles that can be hit; inf, -inf without any."""
-        return self._bvh.bounds
-
-    @property
-    def memory(self) -> int:
-        """Bytes of the tree: nodes and leaves."""
-        return self._bvh.memory
-
-    @property
-    def backend(self) -> str:
-        """The backend that traces: never "auto"."""
-        return self._backend
-
-    @property
-    def device(self) -> str | None:
-        """The Warp device that traces, such as "cuda:0"; None for CPU backends."""
-        return self._device
-
-    @property
-    def tree(self) -> "Tree":
-        """The tree on the scene's Warp device, for `wive.warp_kernels`; ValueError for CPU backends."""
-        if self._warp is None:
-            raise ValueError(
-                f"tree is for scenes with backend 'warp', this one has {self._backend!r}: "
-                "make it with device='cpu' or device='cuda:0'"
-            )
-        return self._warp.tree
-
-    @property
-    def accuracy(self) -> str:
-        """ "watertight", "fast" or "exact"."""
-        return self._bvh.accuracy
-
-    @property
-    def nodes(self) -> str:
-        """ "float32" or "compressed"."""
-        return self._bvh.node_form
-
-    def __len__(self) -> int:
-        """Number of triangles."""
-        return len(self._faces)
-
     def __repr__(self) -> str:
         """Size and options."""
-        return f"Scene({len(self)} triangles, backend={self.backend!r}, accuracy={self.accuracy!r})"
+        shown = f"{len(self)} triangles, backend={self.backend!r}, accuracy={self.accuracy!r}"
+        return f"Scene({shown})" if self._real is FLOAT32 else f"Scene({shown}, precision='float64')"
 
     def __reduce__(self) -> tuple[Callable[..., "Scene"], tuple[Any, ...]]:
         """Pickle the mesh and the options; the tree is rebuilt where they are loaded."""
@@ -292,7 +243,5 @@ def load(path: PathLike, *, backend: str | None = None, device: str | None = Non
         raise ValueError(f"{path}: {error}") from error
 
 
-def _rebuild(vertices: NDArray[np.float32], faces: NDArray[np.int32], options: Options) -> Scene:
+def _rebuild(vertices: Floats, faces: NDArray[np.int32], options: Options) -> Scene:
     return Scene(vertices, faces, **options)
-
-

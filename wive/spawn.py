@@ -6,7 +6,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wive.error_bounds import Float64, blocks_of_hits, corner_rows, cross, dot
+from wive.error_bounds import UNIT_ROUNDOFF, Float64, blocks_of_hits, corner_rows, cross, dot
+from wive.precision import Floats
 
 FLOAT_ROUNDOFF = 2.0**-24
 # Where a triangle's point is, and where its normal points, as computed here in double.
@@ -16,10 +17,32 @@ NORMAL_ERROR = 2.0**-48
 # Twice that covers neighbours in the same plane that reach twice as far.
 CORNER_ERROR = 2 * 7 * FLOAT_ROUNDOFF
 WEIGHTS_ERROR = 2.0**-42
+# The same of a test that is all in double: 903 * 2**-53, and eight times that for neighbours.
+DOUBLE_WEIGHTS_ERROR = 2.0**-40
 # The fast test: |a x b| with every term taken positive is at most 2/sqrt(3) |a||b|.
-FAST_ERROR = 1.1548 * FLOAT_ROUNDOFF
+CROSSED = 1.1548
+FAST_ERROR = CROSSED * FLOAT_ROUNDOFF
 # For second-order terms and the rounding of what is computed here; and for subnormal numbers.
 MARGIN, LEAST = 1.001, 2.0**-120
+DOUBLE_LEAST = 2.0**-300
+
+
+class Rounding(NamedTuple):
+    """What rounding does in the triangle tests of a precision, and to an origin's coordinates."""
+
+    corner: float
+    weights: float
+    fast: float
+    step: float  # how far a coordinate may be rounded, relative to it
+    least: float
+
+
+ROUNDINGS: Mapping[str, Rounding] = {
+    "float32": Rounding(CORNER_ERROR, WEIGHTS_ERROR, FAST_ERROR, 2 * FLOAT_ROUNDOFF, LEAST),
+    "float64": Rounding(
+        2 * 7 * UNIT_ROUNDOFF, DOUBLE_WEIGHTS_ERROR, CROSSED * UNIT_ROUNDOFF, 4 * UNIT_ROUNDOFF, DOUBLE_LEAST
+    ),
+}
 
 
 class Surface(NamedTuple):
@@ -31,36 +54,42 @@ class Surface(NamedTuple):
     second: Float64
     reach: Float64  # the largest coordinate of a corner relative to the point
     from_first: Float64  # from corner 0 to the point
-    step: Float64  # the spacing of floats here, at most
+    step: Float64  # how far a coordinate is rounded, at most
+    rounding: Rounding
 
 
 def spawn_origins(
-    vertices: NDArray[np.float32],
+    vertices: Floats,
     faces: NDArray[np.int32],
     prim: NDArray[np.int32],
-    uv: NDArray[np.float32],
-    directions: NDArray[np.float32],
+    uv: Floats,
+    directions: Floats,
     accuracy: str,
-) -> NDArray[np.float32]:
-    """(n,3) origins for directions (n,3) at uv (n,2) of triangles prim (n,); NaN where prim is negative."""
-    origins = np.full((len(prim), 3), np.nan, np.float32)
+) -> Floats:
+    """(n,3) origins for directions (n,3) at uv (n,2) of triangles prim (n,); NaN where prim is negative.
+
+    In the dtype of the vertices, which is that of the scene they are for.
+    """
+    origins = np.full((len(prim), 3), np.nan, vertices.dtype)
+    rounding = ROUNDINGS[vertices.dtype.name]
     for rows in blocks_of_hits(prim):
         corners = corner_rows(vertices, faces, prim[rows])
         u, v = uv[rows].astype(np.float64).T
         direction = directions[rows].astype(np.float64).T
-        origins[rows] = _origins(corners, u, v, direction, CLEARANCES[accuracy]).T
+        with np.errstate(all="ignore"):  # an infinite direction; a triangle whose area underflows
+            origins[rows] = _origins(corners, u, v, direction, CLEARANCES[accuracy], rounding).T
     return origins
 
 
 def _origins(
-    corners: Float64, u: Float64, v: Float64, direction: Float64, clearance: "Clearance"
-) -> NDArray[np.float32]:
+    corners: Float64, u: Float64, v: Float64, direction: Float64, clearance: "Clearance", rounding: Rounding
+) -> Floats:
     v0, v1, v2 = corners
     first, second = v1 - v0, v2 - v0
     normal = cross(first, second)
     area = np.sqrt(dot(normal, normal))
-    with np.errstate(invalid="ignore"):  # an infinite direction
-        normal *= np.where(dot(normal, direction) < 0, -1.0, 1.0)
+    _, exponent = np.frexp(abs(direction).max(axis=0))  # directions of any length neither over- nor underflow
+    normal *= np.where(dot(normal, np.ldexp(direction, -exponent)) < 0, -1.0, 1.0)
     normal /= area
     point = (1 - u - v) * v0 + u * v1 + v * v2
     largest = abs(corners).max(axis=0)
@@ -71,7 +100,8 @@ def _origins(
         second=np.sqrt(dot(second, second)),
         reach=abs(corners - point).max(axis=(0, 1)),
         from_first=np.sqrt(dot(point - v0, point - v0)),
-        step=2 * FLOAT_ROUNDOFF * largest.max(axis=0) + LEAST,
+        step=rounding.step * largest.max(axis=0) + rounding.least,
+        rounding=rounding,
     )
     unsure = POINT_ERROR * dot(abs(normal), largest)
     # A move takes the origin away from the corners, too: a second round allows for twice the first.
@@ -79,7 +109,8 @@ def _origins(
     offset = _offset(surface, clearance, unsure, surface.step + 2 * offset)
     # Only needles ask for more than their size; nothing is promised for those.
     offset = np.minimum(offset, surface.reach + surface.step)
-    return _round_towards(normal, point + offset * normal)
+    origin = point + offset * normal
+    return _round_towards(normal, origin) if rounding is ROUNDINGS["float32"] else _step_on(normal, origin)
 
 
 def _offset(surface: Surface, clearance: "Clearance", unsure: Float64, moved: Float64) -> Float64:
@@ -87,7 +118,7 @@ def _offset(surface: Surface, clearance: "Clearance", unsure: Float64, moved: Fl
     moved = MARGIN * moved
     lean = NORMAL_ERROR * surface.first * surface.second / surface.area
     needed = np.maximum(clearance(surface, moved), lean * (surface.reach + moved))
-    offset: Float64 = MARGIN * (needed + unsure + lean * surface.step) + LEAST
+    offset: Float64 = MARGIN * (needed + unsure + lean * surface.step) + surface.rounding.least
     return offset
 
 
@@ -99,6 +130,12 @@ def _round_towards(normal: Float64, point: Float64) -> NDArray[np.float32]:
     return np.where(back, np.nextafter(rounded, away), rounded)
 
 
+def _step_on(normal: Float64, point: Float64) -> Float64:
+    """Each coordinate's next double where the normal points: no less than adding up has rounded away."""
+    away = np.where(normal < 0, -np.inf, np.inf)
+    return np.where(normal == 0, point, np.nextafter(point, away))
+
+
 # How far from the plane, (h,), an origin must be for an accuracy's triangle test, if no coordinate of it is
 # farther than `moved` (h,) from the point's.
 Clearance = Callable[[Surface, Float64], Float64]
@@ -107,15 +144,15 @@ Clearance = Callable[[Surface, Float64], Float64]
 def _fast(surface: Surface, moved: Float64) -> Float64:
     longest = np.maximum(surface.first, surface.second)
     lengths = 21 * (surface.from_first + 2 * moved) + 14 * longest
-    needed: Float64 = FAST_ERROR * surface.first * surface.second / surface.area * lengths
+    needed: Float64 = surface.rounding.fast * surface.first * surface.second / surface.area * lengths
     return needed
 
 
 def _watertight(surface: Surface, moved: Float64) -> Float64:
     reach = surface.reach + moved
     x, y, z = abs(surface.normal)
-    corners = CORNER_ERROR * reach * (x + y + z)
-    needed: Float64 = np.maximum(corners, WEIGHTS_ERROR * reach * reach * reach / surface.area)
+    corners = surface.rounding.corner * reach * (x + y + z)
+    needed: Float64 = np.maximum(corners, surface.rounding.weights * reach * reach * reach / surface.area)
     return needed
 
 

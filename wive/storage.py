@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from wive.files import PathLike, atomic_write
 from wive.npzfile import read_npz
+from wive.precision import Floats
 
 FORMAT = "wive scene"
 FORMAT_VERSION = 1
@@ -23,16 +24,17 @@ class Options(TypedDict):
     quality: Literal["medium", "high"]
 
 
-def write_scene(
-    path: PathLike, vertices: NDArray[np.float32], faces: NDArray[np.int32], options: Options
-) -> None:
-    """Write the file, in NumPy's npz format; an interrupted or failed write leaves nothing behind."""
+def write_scene(path: PathLike, vertices: Floats, faces: NDArray[np.int32], options: Options) -> None:
+    """Write the file, in NumPy's npz format, vertices in their dtype, which is the scene's precision.
+
+    An interrupted or failed write leaves nothing behind.
+    """
     header = json.dumps({"format": FORMAT, "version": FORMAT_VERSION, "options": options})
     with atomic_write(path) as file:
         np.savez(file, header=np.array(header), vertices=vertices, faces=faces)
 
 
-def read_scene(path: PathLike) -> tuple[NDArray[np.float32], NDArray[np.int32], Options]:
+def read_scene(path: PathLike) -> tuple[Floats, NDArray[np.int32], Options]:
     """Read what `write_scene` wrote.
 
     Raises OSError where the file can't be read, ValueError where it is no scene or of a newer version.

@@ -9,8 +9,9 @@ Nothing of trimesh is imported here: the mesh that is given brings what is neede
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike, DTypeLike, NDArray
 
+from wive.precision import Floats, real_named
 from wive.scene import Scene
 
 Float64 = NDArray[np.float64]
@@ -39,7 +40,7 @@ class _Placed(NamedTuple):
 class RayMeshIntersector:
     """Ray queries on a `trimesh.Trimesh`, with the methods of trimesh's own intersectors.
 
-    Coordinates go to float32 relative to the mesh's centre; directions are made unit vectors. Follows changes
+    Coordinates go to `dtype` relative to the mesh's centre; directions are made unit vectors. Follows changes
     of the mesh: its tree is built when first needed, and again once the mesh's hash has changed. Can be
     pickled and copied.
     """
@@ -53,6 +54,7 @@ class RayMeshIntersector:
         device: str | None = None,
         accuracy: Literal["fast", "watertight", "exact"] = "watertight",
         threads: int | None = None,
+        dtype: DTypeLike = np.float32,
     ) -> None:
         """Take a mesh to trace.
 
@@ -61,6 +63,8 @@ class RayMeshIntersector:
             scale_to_box: scale the mesh, by a power of two, to a size of about one.
             backend, device, accuracy: of the `wive.Scene`.
             threads: for each query; None is every core.
+            dtype: of the scene's numbers: np.float32, or np.float64 where detail is finer than 1e-7 of the
+                mesh's size.
 
         Raises TypeError where `geometry` is no such mesh. Queries raise what `wive.Scene` and its queries do.
         """
@@ -74,6 +78,7 @@ class RayMeshIntersector:
         self._scale_to_box = scale_to_box
         self._options: dict[str, Any] = {"backend": backend, "device": device, "accuracy": accuracy}
         self._threads = threads
+        self._real = real_named(dtype)
         self._placed: _Placed | None = None
 
     @property
@@ -186,12 +191,13 @@ class RayMeshIntersector:
                 size = float(np.max(bounds[1] - bounds[0]))
                 if self._scale_to_box and 0 < size < np.inf:
                     scale = 2.0 ** -round(np.log2(size))
-            scene = Scene((vertices - origin) * scale, np.asarray(self.mesh.faces), **self._options)
+            placed_vertices = self._real.array((vertices - origin) * scale)
+            scene = Scene(placed_vertices, np.asarray(self.mesh.faces), **self._options)
             self._placed = placed = _Placed(mesh_hash, scene, origin, scale)
         return placed
 
     def _locations(
-        self, prim: NDArray[np.int32], uv: NDArray[np.float32], origins: Float64, directions: Float64
+        self, prim: NDArray[np.int32], uv: Floats, origins: Float64, directions: Float64
     ) -> Float64:
         """(m,3) where rays meet the planes of the triangles they hit, in the mesh's own float64."""
         corners = np.asarray(self.mesh.vertices, np.float64)[np.asarray(self.mesh.faces)[prim]]
@@ -213,7 +219,8 @@ class RayMeshIntersector:
 
     def __copy__(self) -> "RayMeshIntersector":
         """Another one on the same mesh."""
-        return RayMeshIntersector(self.mesh, self._scale_to_box, **self._options, threads=self._threads)
+        kept = {**self._options, "threads": self._threads, "dtype": self._real.dtype}
+        return RayMeshIntersector(self.mesh, self._scale_to_box, **kept)
 
     def __deepcopy__(self, memo: dict[int, Any]) -> "RayMeshIntersector":
         """Another one on the same mesh, as trimesh's own."""

@@ -8,16 +8,20 @@ import warp as wp
 
 from wive import arguments
 from wive.arrays import NUMPY, library_of
+from wive.precision import Floats, real_named
 from wive.rays import Rays
+from wive.warp_kernels.precision import PRECISIONS, precision_of
 
 # Limits that nearly every call has: made once for a scene, they cost a call nothing.
 COMMON_LIMITS = (0.0, float("inf"))
-FLOAT_BYTES = 4
 
 
 @dataclass(frozen=True)
 class WarpRays:
-    """Origins and directions (n,) vec3, tmin and tmax (1,) or (n,) float32, on one device."""
+    """Origins and directions (n,) vec3, tmin and tmax (1,) or (n,) float32, on one device.
+
+    For a float64 scene vec3d and float64.
+    """
 
     origins: Any
     directions: Any
@@ -30,25 +34,29 @@ class WarpRays:
 
 
 class RayLoader:
-    """Turns what users pass into `WarpRays` on one device."""
+    """Turns what users pass into `WarpRays` of one precision on one device."""
 
-    def __init__(self, device: str) -> None:
+    def __init__(self, device: str, precision: str = "float32") -> None:
         """Make the common limits."""
         self.device = device
-        self._common = {value: wp.full(1, value, dtype=wp.float32, device=device) for value in COMMON_LIMITS}
+        self.precision = precision
+        self._dtype = real_named(precision)
+        numbers = PRECISIONS[precision]
+        self._real, self._vec3, self._bytes = numbers.real, numbers.vec3, 4 * numbers.words
+        self._common = {value: wp.full(1, value, dtype=self._real, device=device) for value in COMMON_LIMITS}
 
     def from_numpy(self, rays: Rays) -> WarpRays:
         """Checked as for every backend; copied only where the device is not the host."""
-        origins, directions, tmin, tmax = rays.numpy()
+        origins, directions, tmin, tmax = rays.numpy(self._dtype)
         return WarpRays(
-            wp.array(origins, dtype=wp.vec3, device=self.device, copy=False),
-            wp.array(directions, dtype=wp.vec3, device=self.device, copy=False),
+            wp.array(origins, dtype=self._vec3, device=self.device, copy=False),
+            wp.array(directions, dtype=self._vec3, device=self.device, copy=False),
             self._limit_of_numpy(tmin),
             self._limit_of_numpy(tmax),
         )
 
     def from_device(self, rays: Rays) -> WarpRays:
-        """Arrays on this device, float32 as they are; nothing of them goes through the host."""
+        """Arrays on this device, of the scene's type as they are; nothing of them goes through the host."""
         origins, one_origin = self._vectors("origins", rays.origins)
         directions, one_direction = self._vectors("directions", rays.directions)
         count = len(directions) if one_origin else len(origins)
@@ -57,8 +65,8 @@ class RayLoader:
                 f"origins and directions must be equally many, got {count} and {len(directions)}"
             )
         return WarpRays(
-            _vec3_view(origins, count, 0) if one_origin else origins,
-            _vec3_view(directions, count, 0) if one_direction else directions,
+            _view(origins, count, 0) if one_origin else origins,
+            _view(directions, count, 0) if one_direction else directions,
             self._limit("tmin", rays.tmin, count),
             self._limit("tmax", rays.tmax, count),
         )
@@ -67,11 +75,11 @@ class RayLoader:
         """(count,) vec3 of directions (count,3), or (3,) for all; NumPy's are copied to the device."""
         library = library_of(value)
         if library is NUMPY:
-            rows = arguments.directions(value, count)
+            rows = arguments.directions(value, count, self._dtype)
             if rows.strides[0] == 0:
-                one = wp.array(rows[:1], dtype=wp.vec3, device=self.device)
-                return _vec3_view(one, count, 0)
-            return wp.array(rows, dtype=wp.vec3, device=self.device, copy=False)
+                one = wp.array(rows[:1], dtype=self._vec3, device=self.device)
+                return _view(one, count, 0)
+            return wp.array(rows, dtype=self._vec3, device=self.device, copy=False)
         place = library.device(value)
         if place not in (self.device, None if self.device != "cpu" else self.device):
             raise ValueError(
@@ -80,7 +88,7 @@ class RayLoader:
             )
         array, shared = self._vectors("directions", value)
         if shared:
-            return _vec3_view(array, count, 0)
+            return _view(array, count, 0)
         if len(array) != count:
             raise ValueError(
                 f"directions must have shape ({count}, 3), one a hit, or (3,), got {(len(array), 3)}"
@@ -91,60 +99,65 @@ class RayLoader:
         """(n,) vec3 and False, or the (1,) that all rays share and True."""
         library = library_of(value)
         if library is NUMPY:
-            return wp.full(1, wp.vec3(*map(float, value)), dtype=wp.vec3, device=self.device), True
-        array = self._float32(name, value)
-        if array.dtype is wp.vec3 and array.ndim == 1:
+            return wp.full(1, self._vec3(*map(float, value)), dtype=self._vec3, device=self.device), True
+        array = self._checked(name, value)
+        if array.dtype is self._vec3 and array.ndim == 1:
             return array, False
-        if array.dtype is wp.vec3 or array.ndim not in (1, 2) or array.shape[-1] != 3:
+        if array.dtype is self._vec3 or array.ndim not in (1, 2) or array.shape[-1] != 3:
             raise ValueError(
                 f"{name} must have shape (n, 3), or (3,) if all rays share it, got {_shape(array)}"
             )
-        rows = array if array.strides[-1] == FLOAT_BYTES else array.contiguous()
+        rows = array if array.strides[-1] == self._bytes else array.contiguous()
         if array.ndim == 1:
-            return _vec3_view(rows, 1, 0), True
-        return _vec3_view(rows, len(rows), rows.strides[0]), False
+            return _view(rows, 1, 0), True
+        return _view(rows, len(rows), rows.strides[0]), False
 
     def _limit(self, name: str, value: Any, count: int) -> Any:
         """(1,) or (count,) float32."""
         if type(value) is float and value in self._common:
             return self._common[value]
         if library_of(value) is NUMPY:
-            (number,) = arguments.limits(name, value, 1)
-            return self._limit_of_numpy(np.array([number], np.float32))
-        array = self._float32(name, value)
-        if array.shape not in ((1,), (count,)) or array.dtype is not wp.float32:
+            (number,) = arguments.limits(name, value, 1, self._dtype)
+            return self._limit_of_numpy(np.array([number], self.precision))
+        array = self._checked(name, value)
+        if array.shape not in ((1,), (count,)) or array.dtype is not self._real:
             raise ValueError(
                 f"{name} must be one number or have shape ({count},), one a ray, got shape {_shape(array)}"
             )
         return array
 
-    def _limit_of_numpy(self, values: arguments.Float32) -> Any:
+    def _limit_of_numpy(self, values: Floats) -> Any:
         if len(values) == 1 and float(values[0]) in self._common:
             return self._common[float(values[0])]
         if len(values) == 1:
-            return wp.full(1, float(values[0]), dtype=wp.float32, device=self.device)
-        return wp.array(values, dtype=wp.float32, device=self.device, copy=False)
+            return wp.full(1, float(values[0]), dtype=self._real, device=self.device)
+        return wp.array(values, dtype=self._real, device=self.device, copy=False)
 
-    def _float32(self, name: str, value: Any) -> Any:
-        """The array as Warp's: of float32 or of vec3."""
+    def _checked(self, name: str, value: Any) -> Any:
+        """The array as Warp's: of the scene's numbers or of vectors of three."""
         found: object = getattr(value, "dtype", "another type")
         try:
             array = library_of(value).to_warp(value, self.device)
-            if array.dtype in (wp.vec3, wp.float32):
+            if array.dtype in (self._vec3, self._real):
                 return array
             found = wp.types.type_repr(array.dtype)
         except (RuntimeError, TypeError, ValueError, BufferError):
             pass  # a type that Warp has no name for: `found` is what its owner calls it
         raise TypeError(
-            f"{name} must be float32 on a Warp device, where nothing is converted, got {found}: "
+            f"{name} must be {self.precision} on a Warp device, where nothing is converted, got {found}: "
             "convert it first"
         )
 
 
-def _vec3_view(array: Any, count: int, stride: int) -> Any:
-    """`count` vec3 over the same memory, `stride` bytes apart."""
+def _view(array: Any, count: int, stride: int) -> Any:
+    """`count` vectors of three over the same memory, `stride` bytes apart."""
     view = wp.array(
-        ptr=array.ptr, dtype=wp.vec3, shape=(count,), strides=(stride,), device=array.device, copy=False
+        ptr=array.ptr,
+        dtype=PRECISIONS[precision_of(array)].vec3,
+        shape=(count,),
+        strides=(stride,),
+        device=array.device,
+        copy=False,
     )
     view._owner = array  # lives as long as the view
     return view

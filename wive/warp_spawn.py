@@ -3,8 +3,9 @@
 Operation by operation as wive/error_bounds.py and wive/spawn.py, where the reasons are: same bits.
 """
 
-# mypy: disable-error-code="untyped-decorator"
+# mypy: disable-error-code="untyped-decorator, valid-type, no-redef"
 
+import functools
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,21 +13,16 @@ import warp as wp
 from numpy.typing import ArrayLike
 
 from wive import error_bounds, spawn
-from wive.warp_hits import WarpHits, _in_double
+from wive.warp_hits import OPTIONS, WarpHits, in_double
+from wive.warp_kernels.frame import powers_of
+from wive.warp_kernels.precision import PRECISIONS, precision_of
 from wive.warp_rays import RayLoader, WarpRays
-
-wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
 ERROR = wp.constant(wp.float64(error_bounds.ROUNDINGS * error_bounds.UNIT_ROUNDOFF))
 ROUND_UP = wp.constant(wp.float64(1 + 8 * error_bounds.UNIT_ROUNDOFF))
-SPACING = wp.constant(wp.float64(2 * spawn.FLOAT_ROUNDOFF))
 POINT_ERROR = wp.constant(wp.float64(spawn.POINT_ERROR))
 NORMAL_ERROR = wp.constant(wp.float64(spawn.NORMAL_ERROR))
-CORNER_ERROR = wp.constant(wp.float64(spawn.CORNER_ERROR))
-WEIGHTS_ERROR = wp.constant(wp.float64(spawn.WEIGHTS_ERROR))
-FAST_ERROR = wp.constant(wp.float64(spawn.FAST_ERROR))
 MARGIN = wp.constant(wp.float64(spawn.MARGIN))
-LEAST = wp.constant(wp.float64(spawn.LEAST))
 
 ACCURACIES = tuple(spawn.CLEARANCES)
 FAST, WATERTIGHT = (wp.constant(ACCURACIES.index(name)) for name in ("fast", "watertight"))
@@ -45,18 +41,27 @@ class WarpClosestHits(WarpHits):
         bounds = wp.empty(len(self.prim), dtype=wp.float64, device=self.prim.device)
         rays = [self.rays.origins, self.rays.directions]
         inputs = [*self.mesh_on_device(), self.prim, self.t, *rays]
-        wp.launch(_error_bounds, len(bounds), inputs, [bounds], device=bounds.device)
+        kernel = bounds_kernel(precision_of(self.t))
+        wp.launch(kernel, len(bounds), inputs, [bounds], device=bounds.device)
         return bounds
 
     def spawn(self, directions: ArrayLike) -> Any:
-        """(n,) vec3."""
-        loader = RayLoader(self.prim.device.alias)
+        """(n,) vec3, or vec3d in a float64 scene."""
+        precision = precision_of(self.t)
+        loader = RayLoader(self.prim.device.alias, precision)
         rows = loader.directions(directions, len(self.prim))
-        origins = wp.empty(len(self.prim), dtype=wp.vec3, device=self.prim.device)
+        origins = wp.empty(len(self.prim), dtype=PRECISIONS[precision].vec3, device=self.prim.device)
         accuracy = ACCURACIES.index(self.accuracy)
         inputs = [*self.mesh_on_device(), self.prim, self.uv, rows, accuracy]
-        wp.launch(_spawn_origins, len(origins), inputs, [origins], device=origins.device)
+        wp.launch(spawn_kernel(precision), len(origins), inputs, [origins], device=origins.device)
         return origins
+
+
+def _module(precision: str) -> Any:
+    """Where kernels for scenes of that precision are compiled together."""
+    module = wp.get_module(f"{__name__}.{precision}")
+    wp.set_module_options(OPTIONS, module=module)
+    return module
 
 
 @wp.func
@@ -83,38 +88,54 @@ def _crossed_sizes(a: wp.vec3d, b: wp.vec3d) -> wp.vec3d:
     )
 
 
-@wp.kernel
-def _error_bounds(
-    vertices: wp.array[wp.vec3],
-    faces: wp.array[wp.vec3i],
-    prim: wp.array[wp.int32],
-    distance: wp.array[wp.float32],
-    origins: wp.array[wp.vec3],
-    directions: wp.array[wp.vec3],
-    bounds: wp.array[wp.float64],
-) -> None:
-    i = wp.tid()
-    if prim[i] < 0:
-        bounds[i] = wp.float64(wp.nan)
-        return
-    face = faces[prim[i]]
-    v0 = _in_double(vertices[face[0]])
-    first = _in_double(vertices[face[1]]) - v0
-    second = _in_double(vertices[face[2]]) - v0
-    away = v0 - _in_double(origins[i])
-    direction = _in_double(directions[i])
-    t = wp.float64(distance[i])
-    normal = _cross(first, second)
-    size = _crossed_sizes(first, second)
-    height = _dot(normal, away)
-    slope = _dot(normal, direction)
-    height_error = ERROR * _dot(size, _abs(away))
-    slope_error = ERROR * _dot(size, _abs(direction))
-    if wp.abs(slope) > slope_error and wp.isfinite(t):
-        residual = wp.abs(t * slope - height) + (height_error + wp.abs(t) * slope_error)
-        bounds[i] = residual / (wp.abs(slope) - slope_error) * ROUND_UP
-    else:
-        bounds[i] = wp.float64(wp.inf)
+@wp.func
+def _sum(a: wp.vec3d) -> wp.float64:
+    return a[0] + a[1] + a[2]
+
+
+@functools.cache
+def bounds_kernel(precision: str) -> Any:
+    """The kernel behind `error_bound` for scenes of that precision."""
+    real, vec3 = PRECISIONS[precision].real, PRECISIONS[precision].vec3
+    underflow = wp.float64(error_bounds.UNDERFLOW if precision == "float64" else 0.0)
+
+    @wp.kernel(module=_module(precision))
+    def bound_errors(
+        vertices: wp.array[vec3],
+        faces: wp.array[wp.vec3i],
+        prim: wp.array[wp.int32],
+        distance: wp.array[real],
+        origins: wp.array[vec3],
+        directions: wp.array[vec3],
+        bounds: wp.array[wp.float64],
+    ) -> None:
+        i = wp.tid()
+        if prim[i] < 0:
+            bounds[i] = wp.float64(wp.nan)
+            return
+        face = faces[prim[i]]
+        v0 = in_double(vertices[face[0]])
+        first = in_double(vertices[face[1]]) - v0
+        second = in_double(vertices[face[2]]) - v0
+        away = v0 - in_double(origins[i])
+        direction = in_double(directions[i])
+        t = wp.float64(distance[i])
+        normal = _cross(first, second)
+        size = _crossed_sizes(first, second)
+        height = _dot(normal, away)
+        slope = _dot(normal, direction)
+        height_error = ERROR * _dot(size, _abs(away))
+        slope_error = ERROR * _dot(size, _abs(direction))
+        if wp.static(underflow != 0.0):
+            height_error = height_error + underflow * (wp.float64(1.0) + _sum(_abs(away)))
+            slope_error = slope_error + underflow * (wp.float64(1.0) + _sum(_abs(direction)))
+        if wp.abs(slope) > slope_error and wp.isfinite(t):
+            residual = wp.abs(t * slope - height) + (height_error + wp.abs(t) * slope_error)
+            bounds[i] = residual / (wp.abs(slope) - slope_error) * ROUND_UP + underflow
+        else:
+            bounds[i] = wp.float64(wp.inf)
+
+    return bound_errors
 
 
 @wp.struct
@@ -132,29 +153,6 @@ class _Surface:
 
 
 @wp.func
-def _clearance(surface: _Surface, moved: wp.float64, accuracy: int) -> wp.float64:
-    if accuracy == FAST:
-        longest = wp.max(surface.first, surface.second)
-        lengths = wp.float64(21.0) * (surface.from_first + wp.float64(2.0) * moved)
-        lengths = lengths + wp.float64(14.0) * longest
-        return FAST_ERROR * surface.first * surface.second / surface.area * lengths
-    if accuracy == WATERTIGHT:
-        reach = surface.reach + moved
-        n = _abs(surface.normal)
-        corners = CORNER_ERROR * reach * (n[0] + n[1] + n[2])
-        return wp.max(corners, WEIGHTS_ERROR * reach * reach * reach / surface.area)
-    return wp.float64(0.0)
-
-
-@wp.func
-def _offset(surface: _Surface, given: wp.float64, accuracy: int) -> wp.float64:
-    moved = MARGIN * given
-    lean = NORMAL_ERROR * surface.first * surface.second / surface.area
-    needed = wp.max(_clearance(surface, moved, accuracy), lean * (surface.reach + moved))
-    return MARGIN * (needed + surface.unsure + lean * surface.step) + LEAST
-
-
-@wp.func
 def _round_towards(normal: wp.float64, x: wp.float64) -> wp.float32:
     rounded = wp.float32(x)
     if (wp.float64(rounded) - x) * normal < wp.float64(0.0):
@@ -168,54 +166,102 @@ def _round_towards(normal: wp.float64, x: wp.float64) -> wp.float32:
 
 
 @wp.func
+def _step_on(normal: wp.float64, x: wp.float64) -> wp.float64:
+    if normal == wp.float64(0.0):
+        return x
+    bits = wp.cast(x, wp.int64)
+    if x == wp.float64(0.0):
+        smallest = wp.cast(wp.int64(1), wp.float64)
+        return wp.where(normal < wp.float64(0.0), -smallest, smallest)
+    grow = (x < wp.float64(0.0)) == (normal < wp.float64(0.0))
+    return wp.cast(wp.where(grow, bits + wp.int64(1), bits - wp.int64(1)), wp.float64)
+
+
+@wp.func
 def _largest(a: wp.vec3d) -> wp.float64:
     return wp.max(wp.max(wp.abs(a[0]), wp.abs(a[1])), wp.abs(a[2]))
 
 
-@wp.kernel
-def _spawn_origins(
-    vertices: wp.array[wp.vec3],
-    faces: wp.array[wp.vec3i],
-    prim: wp.array[wp.int32],
-    uv: wp.array[wp.vec2],
-    directions: wp.array[wp.vec3],
-    accuracy: int,
-    origins: wp.array[wp.vec3],
-) -> None:
-    i = wp.tid()
-    if prim[i] < 0:
-        origins[i] = wp.vec3(wp.nan)
-        return
-    face = faces[prim[i]]
-    v0 = _in_double(vertices[face[0]])
-    v1 = _in_double(vertices[face[1]])
-    v2 = _in_double(vertices[face[2]])
-    first = v1 - v0
-    second = v2 - v0
-    normal = _cross(first, second)
-    area = wp.sqrt(_dot(normal, normal))
-    if _dot(normal, _in_double(directions[i])) < wp.float64(0.0):
-        normal = -normal
-    normal = wp.vec3d(normal[0] / area, normal[1] / area, normal[2] / area)
-    u = wp.float64(uv[i][0])
-    v = wp.float64(uv[i][1])
-    w = wp.float64(1.0) - u - v
-    point = w * v0 + u * v1 + v * v2
+@functools.cache
+def spawn_kernel(precision: str) -> Any:
+    """The kernel behind `spawn` for scenes of that precision."""
+    numbers, rounding = PRECISIONS[precision], spawn.ROUNDINGS[precision]
+    real, vec2, vec3 = numbers.real, numbers.vec2, numbers.vec3
+    corner_error, weights_error, fast_error, step_size, least = map(wp.float64, rounding)
+    leave = _round_towards if precision == "float32" else _step_on
 
-    surface = _Surface()
-    surface.normal = normal
-    surface.area = area
-    surface.first = wp.sqrt(_dot(first, first))
-    surface.second = wp.sqrt(_dot(second, second))
-    surface.reach = wp.max(wp.max(_largest(v0 - point), _largest(v1 - point)), _largest(v2 - point))
-    surface.from_first = wp.sqrt(_dot(point - v0, point - v0))
-    largest = wp.max(wp.max(_abs(v0), _abs(v1)), _abs(v2))
-    surface.step = SPACING * _largest(largest) + LEAST
-    surface.unsure = POINT_ERROR * _dot(_abs(normal), largest)
-    offset = _offset(surface, surface.step, accuracy)
-    offset = _offset(surface, surface.step + wp.float64(2.0) * offset, accuracy)
-    offset = wp.min(offset, surface.reach + surface.step)
-    at = point + offset * normal
-    origins[i] = wp.vec3(
-        _round_towards(normal[0], at[0]), _round_towards(normal[1], at[1]), _round_towards(normal[2], at[2])
-    )
+    @wp.func
+    def clearance(surface: _Surface, moved: wp.float64, accuracy: int) -> wp.float64:
+        if accuracy == FAST:
+            longest = wp.max(surface.first, surface.second)
+            lengths = wp.float64(21.0) * (surface.from_first + wp.float64(2.0) * moved)
+            lengths = lengths + wp.float64(14.0) * longest
+            return fast_error * surface.first * surface.second / surface.area * lengths
+        if accuracy == WATERTIGHT:
+            reach = surface.reach + moved
+            n = _abs(surface.normal)
+            corners = corner_error * reach * (n[0] + n[1] + n[2])
+            return wp.max(corners, weights_error * reach * reach * reach / surface.area)
+        return wp.float64(0.0)
+
+    @wp.func
+    def offset_of(surface: _Surface, given: wp.float64, accuracy: int) -> wp.float64:
+        moved = MARGIN * given
+        lean = NORMAL_ERROR * surface.first * surface.second / surface.area
+        needed = wp.max(clearance(surface, moved, accuracy), lean * (surface.reach + moved))
+        return MARGIN * (needed + surface.unsure + lean * surface.step) + least
+
+    @wp.kernel(module=_module(precision))
+    def spawn_origins(
+        vertices: wp.array[vec3],
+        faces: wp.array[wp.vec3i],
+        prim: wp.array[wp.int32],
+        uv: wp.array[vec2],
+        directions: wp.array[vec3],
+        accuracy: int,
+        origins: wp.array[vec3],
+    ) -> None:
+        i = wp.tid()
+        if prim[i] < 0:
+            origins[i] = vec3(real(wp.nan))
+            return
+        face = faces[prim[i]]
+        v0 = in_double(vertices[face[0]])
+        v1 = in_double(vertices[face[1]])
+        v2 = in_double(vertices[face[2]])
+        first = v1 - v0
+        second = v2 - v0
+        normal = _cross(first, second)
+        area = wp.sqrt(_dot(normal, normal))
+        direction = in_double(directions[i])
+        # Its longest component brought to [1/2, 1): no product overflows.
+        direction = direction * (powers_of(_largest(direction))[0] * wp.float64(0.5))
+        if _dot(normal, direction) < wp.float64(0.0):
+            normal = -normal
+        normal = wp.vec3d(normal[0] / area, normal[1] / area, normal[2] / area)
+        u = wp.float64(uv[i][0])
+        v = wp.float64(uv[i][1])
+        w = wp.float64(1.0) - u - v
+        point = w * v0 + u * v1 + v * v2
+
+        surface = _Surface()
+        surface.normal = normal
+        surface.area = area
+        surface.first = wp.sqrt(_dot(first, first))
+        surface.second = wp.sqrt(_dot(second, second))
+        surface.reach = wp.max(wp.max(_largest(v0 - point), _largest(v1 - point)), _largest(v2 - point))
+        surface.from_first = wp.sqrt(_dot(point - v0, point - v0))
+        largest = wp.max(wp.max(_abs(v0), _abs(v1)), _abs(v2))
+        surface.step = step_size * _largest(largest) + least
+        surface.unsure = POINT_ERROR * _dot(_abs(normal), largest)
+        offset = offset_of(surface, surface.step, accuracy)
+        offset = offset_of(surface, surface.step + wp.float64(2.0) * offset, accuracy)
+        offset = wp.min(offset, surface.reach + surface.step)
+        at = point + offset * normal
+        origins[i] = vec3(
+            leave(normal[0], at[0]),
+            leave(normal[1], at[1]),
+            leave(normal[2], at[2]),
+        )
+
+    return spawn_origins

@@ -22,6 +22,7 @@ from wive.warp_kernels import (
     scan_counts,
     upload,
 )
+from wive.warp_kernels.precision import PRECISIONS
 from wive.warp_rays import RayLoader, WarpRays
 from wive.warp_spawn import WarpClosestHits
 
@@ -46,7 +47,8 @@ class WarpTracer:
         self.device = device
         self._vertices, self._faces = vertices, faces
         self._accuracy = bvh.accuracy
-        self._loader = RayLoader(device)
+        self._numbers = PRECISIONS[self.tree.precision]
+        self._loader = RayLoader(device, self.tree.precision)
 
     def intersect(self, rays: Rays, lanes: Lanes | None, stats: bool) -> tuple[Hits, Stats | None]:
         """Closest hits, in arrays of the library that the rays came in."""
@@ -117,11 +119,11 @@ class WarpTracer:
 
     @functools.cached_property
     def _mesh(self) -> tuple[Any, Any]:
-        vertices = wp.array(self._vertices, dtype=wp.vec3, device=self.device, copy=False)
+        vertices = wp.array(self._vertices, dtype=self._numbers.vec3, device=self.device, copy=False)
         return vertices, wp.array(self._faces, dtype=wp.vec3i, device=self.device, copy=False)
 
     def mesh(self) -> tuple[Any, Any]:
-        """Vertices (v,) vec3 and faces (f,) vec3i on the device; copied there when first asked for."""
+        """Vertices (v,) vec3 or vec3d and faces (f,) vec3i on the device; copied when first asked for."""
         return self._mesh
 
     def _load(self, rays: Rays) -> WarpRays:
@@ -131,9 +133,9 @@ class WarpTracer:
         return choose_lanes(asked, len(rays), self.device != "cpu")
 
     def _outputs(self, count: int) -> tuple[Any, Any, Any]:
-        t = wp.empty(count, dtype=wp.float32, device=self.device)
+        t = wp.empty(count, dtype=self._numbers.real, device=self.device)
         prim = wp.empty(count, dtype=wp.int32, device=self.device)
-        return t, prim, wp.empty(count, dtype=wp.vec2, device=self.device)
+        return t, prim, wp.empty(count, dtype=self._numbers.vec2, device=self.device)
 
     def _counts(self, count: int, stats: bool) -> Any:
         return wp.empty(count, dtype=wp.vec3i, device=self.device) if stats else None
