@@ -82,8 +82,8 @@ def test_a_hit_is_found_again_with_tmax_at_its_own_distance(kernel: str, nodes: 
         )
         bvh = _cpu.Bvh(flat @ basis, np.arange(1200, dtype=np.int32).reshape(-1, 3), nodes=nodes)
         ends = np.append(
-            random.uniform(-2, 2, (2, 10_000, 2)),
-            3 * flatness * random.standard_normal((2, 10_000, 1)),
+            random.uniform(-2, 2, (2, 4000, 2)),
+            3 * flatness * random.standard_normal((2, 4000, 1)),
             axis=2,
         )
         points = ends @ basis
@@ -93,7 +93,7 @@ def test_a_hit_is_found_again_with_tmax_at_its_own_distance(kernel: str, nodes: 
         found += hit.sum()
         again = query(bvh, kernel, "occluded", origins[hit], directions[hit], 0.0, t[hit])[0]
         assert again.all()
-    assert found > 10_000
+    assert found > 4000
 
 
 @each_kernel

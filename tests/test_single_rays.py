@@ -21,7 +21,7 @@ def test_a_ray_alone_with_a_finite_tmax_finds_what_it_finds_in_flight(kernel: st
     )
     for a, b in zip(alone, among_others, strict=True):
         assert np.array_equal(a, b, equal_nan=True)
-    assert (alone[1] >= 0).mean() > 0.3
+    assert (alone[1] >= 0).mean() > 0.2
 
 
 def test_one_ray_at_a_time_finds_what_the_batch_finds(backend: str) -> None:
