@@ -45,10 +45,12 @@ COMPRESSED_BUILDS = [(query, accuracy) for query in KERNELS for accuracy in ("fa
     (query, "exact") for query in EXACT_QUERIES
 ]
 DOUBLE_BUILDS = [
-    (query, architecture, accuracy, "float32")
-    for query, architecture in [*((query, 90) for query in KERNELS), ("closest", 80), ("closest", 100)]
-    for accuracy in ("fast", "watertight")
-] + [("closest", 90, "watertight", "compressed")]
+    (query, 90, accuracy, "float32") for query in KERNELS for accuracy in ("fast", "watertight")
+] + [
+    ("closest", 80, "watertight", "float32"),
+    ("closest", 100, "watertight", "float32"),
+    ("closest", 90, "watertight", "compressed"),
+]
 
 # Registers, measured with NVRTC and ptxas 13.5 and rounded up to a multiple of eight.
 REGISTERS = {
