@@ -118,8 +118,11 @@ def test_where_all_numbers_are_float32_float64_answers_the_same_but_finer(
         _cpu.Bvh(vertices.astype(dtype), faces, nodes=nodes) for dtype in (np.float32, np.float64)
     )
     assert np.array_equal(narrow.center, wide.center) and np.array_equal(narrow.bounds, wide.bounds)
-    if place == 0.0:
-        assert np.array_equal(narrow.nodes[:, :-2], wide.nodes[:, :-2]) or nodes == "compressed"
+    if (
+        place == 0.0 and nodes == "float32"
+    ):  # the same boxes; where they stand is decided by areas, which are rounded
+        boxes = [sorted(tree.nodes[:, :6].swapaxes(1, 2).reshape(-1, 6).tolist()) for tree in (narrow, wide)]
+        assert boxes[0] == boxes[1]
     t32, prim32, _ = closest(narrow, kernel, origins, directions)
     t64, prim64, _ = closest(wide, kernel, origins.astype(np.float64), directions.astype(np.float64))
     assert (prim32 >= 0).all()
