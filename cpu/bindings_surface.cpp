@@ -1,5 +1,7 @@
 // Points and normals of hits, computed when they are asked for.
+#include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "bindings.h"
 #include "parallel.h"
@@ -70,11 +72,54 @@ py::array_t<double> normals(const Array<Real>& vertices, const Array<std::int32_
     });
 }
 
+// Where rays meet the planes of the triangles they hit, in double whatever the tree's precision; the point at u and v where
+// a ray is so flat that its plane says little.
+template <class Real>
+py::array_t<double> points_on_rays(const Array<double>& vertices, const Array<std::int32_t>& faces,
+                                   const Array<std::int32_t>& prim, const Array<Real>& uv, const Array<std::int64_t>& ray,
+                                   const Array<double>& origins, const Array<double>& directions) {
+    constexpr double grazing = 1e-3;  // the sine of the angle
+    expect_shape(uv, 2, "uv: expected shape (n, 2)");
+    expect_shape(origins, 3, "origins: expected shape (n, 3)");
+    expect_shape(directions, 3, "directions: expected shape (n, 3)");
+    expect(uv.shape(0) == prim.size() && ray.size() == prim.size(), "uv, ray: expected as many as prim");
+    expect(origins.shape(0) == directions.shape(0), "directions: expected as many as origins");
+    const Real* weights = uv.data();
+    const std::int64_t* rays = ray.data();
+    const double *from = origins.data(), *along = directions.data();
+    const auto ray_count = static_cast<std::uint64_t>(origins.shape(0));
+    return each_hit(vertices, faces, prim, [=](std::size_t i, bool known, const double (&corner)[3][3], double* out) {
+        const auto index = static_cast<std::uint64_t>(rays[i]);
+        if (!known || index >= ray_count) {
+            std::fill(out, out + 3, nan);
+            return;
+        }
+        const double *o = from + 3 * index, *d = along + 3 * index;
+        double across[3], slope = 0, height = 0, area = 0, length = 0;
+        for (int axis = 0; axis < 3; ++axis) {
+            const int j = (axis + 1) % 3, k = (axis + 2) % 3;
+            across[axis] = (corner[1][j] - corner[0][j]) * (corner[2][k] - corner[0][k]) -
+                           (corner[1][k] - corner[0][k]) * (corner[2][j] - corner[0][j]);
+            slope += across[axis] * d[axis];
+            height += across[axis] * (corner[0][axis] - o[axis]);
+            area += across[axis] * across[axis];
+            length += d[axis] * d[axis];
+        }
+        const double u = weights[2 * i], v = weights[2 * i + 1], t = height / slope;
+        const bool steep = std::abs(slope) > grazing * std::sqrt(area) * std::sqrt(length);
+        for (int axis = 0; axis < 3; ++axis)
+            out[axis] = steep ? o[axis] + t * d[axis]
+                              : (1 - u - v) * corner[0][axis] + u * corner[1][axis] + v * corner[2][axis];
+    });
+}
+
 }  // namespace
 
 void bind_surface(py::module_& m) {
     for_each_precision([&]<class Real>(Real) {
         m.def("surface_points", &points<Real>, array_arg("vertices"), array_arg("faces"), array_arg("prim"), array_arg("uv"));
+        m.def("points_on_rays", &points_on_rays<Real>, array_arg("vertices"), array_arg("faces"), array_arg("prim"),
+              array_arg("uv"), array_arg("ray"), array_arg("origins"), array_arg("directions"));
         m.def("surface_normals", &normals<Real>, array_arg("vertices"), array_arg("faces"), array_arg("prim"));
     });
 }

@@ -119,3 +119,30 @@ def test_an_unknown_scene_ends_in_one_line(bench: Callable[..., dict[str, Any]])
     assert answer.returncode == 2
     assert answer.stderr.startswith("bench order: no scene 'nowhere'")
     assert answer.stderr.count("\n") == 1
+
+
+def quote(*options: str) -> str:
+    """What `python -m bench quote` prints."""
+    answer = subprocess.run(
+        [sys.executable, "-m", "bench", "quote", *options],
+        cwd=ROOT, capture_output=True, text=True, timeout=60, check=False,
+    )  # fmt: skip
+    assert answer.returncode == 0, answer.stderr
+    return answer.stdout
+
+
+def test_the_documents_tables_are_those_of_the_results(tmp_path: Path) -> None:
+    text = (ROOT / "docs" / "benchmarks.md").read_text()
+    copy = tmp_path / "benchmarks.md"
+    copy.write_text(re.sub(r"(<!-- quote: .* -->\n).*?(<!-- end -->)", r"\1\2", text, flags=re.DOTALL))
+    assert copy.read_text() != text
+    assert quote("--document", str(copy)) == ""
+    assert copy.read_text() == text
+
+
+def test_a_table_without_results_stays_as_it_is(tmp_path: Path) -> None:
+    document = tmp_path / "some.md"
+    document.write_text("before\n<!-- quote: paper.gains -->\n\nold\n<!-- end -->\nafter\n")
+    said = quote("--document", str(document), "--results", str(tmp_path))
+    assert said == "paper.gains: no results yet, run `python -m bench paper`\n"
+    assert "old" in document.read_text()

@@ -8,6 +8,7 @@ import warp as wp
 
 from wive.warp_kernels.frame import RayFrame, axes_of, component
 from wive.warp_kernels.lanes import load_float, lowest_lane, product, product_double, without_gradient
+from wive.warp_kernels.sheared import edges_in_lanes
 
 # What the test keeps of a ray, in words: the axis behind each sheared axis, the origin, the direction (both
 # sheared axis by axis) and the shear. It is needed in leaves only, so it waits in memory behind the stack's
@@ -38,8 +39,7 @@ def edges_of(a: wp.vec3d, b: wp.vec3d, c: wp.vec3d):
 def watertight_triangles(lanes: SimpleNamespace, form: SimpleNamespace, kept: int) -> SimpleNamespace:
     """The test for these lanes and blocks, its ray kept from word `kept` of the stack."""
     length: int = lanes.triangles_length
-    vector, products = lanes.triangles, lanes.products
-    load, used, stride_of, vertex_at = form.load, form.used, form.stride, form.vertex_at
+    used, stride_of, vertex_at = form.used, form.stride, form.vertex_at
     store_word, load_word, stack_argument = lanes.store_word, lanes.load_word, lanes.stack_argument
 
     @without_gradient
@@ -172,30 +172,13 @@ def watertight_triangles(lanes: SimpleNamespace, form: SimpleNamespace, kept: in
         positive = wp.where(w[0] > zero or w[1] > zero or w[2] > zero, 1, 0)
         return positive - negative
 
+    edges = edges_in_lanes(lanes, form, axis_of, kept_origin, kept_shear)
+
     @without_gradient
     @wp.func
     def candidates(units: wp.uint64, block: int, lane: int, stack: stack_argument):
         """The lanes whose triangle the ray's line meets, one bit each, and those passed clockwise."""
-        x = axis_of(stack, 0)
-        y = axis_of(stack, 1)
-        z = axis_of(stack, 2)
-        ox = vector(kept_origin(stack, 0))
-        oy = vector(kept_origin(stack, 1))
-        oz = vector(kept_origin(stack, 2))
-        sx = vector(kept_shear(stack, 0))
-        sy = vector(kept_shear(stack, 1))
-        za = load(units, block, lane, 0, z) - oz
-        zb = load(units, block, lane, 1, z) - oz
-        zc = load(units, block, lane, 2, z) - oz
-        xa = (load(units, block, lane, 0, x) - ox) - products(sx, za)
-        xb = (load(units, block, lane, 1, x) - ox) - products(sx, zb)
-        xc = (load(units, block, lane, 2, x) - ox) - products(sx, zc)
-        ya = (load(units, block, lane, 0, y) - oy) - products(sy, za)
-        yb = (load(units, block, lane, 1, y) - oy) - products(sy, zb)
-        yc = (load(units, block, lane, 2, y) - oy) - products(sy, zc)
-        u = products(xc, yb) - products(yc, xb)
-        v = products(xa, yc) - products(ya, xc)
-        w = products(xb, ya) - products(yb, xa)
+        u, v, w = edges(units, block, lane, stack)
         low = wp.min(wp.min(u, v), w)
         high = wp.max(wp.max(u, v), w)
         lanes = wp.uint32(0)

@@ -10,6 +10,7 @@ from wive.warp_kernels.frame import RayFrame64, axes_of, component
 from wive.warp_kernels.lanes import load_double, product_double, without_gradient
 from wive.warp_kernels.native import EXACT_WEIGHT
 from wive.warp_kernels.precision import kept_numbers
+from wive.warp_kernels.sheared import edges_in_lanes
 
 # What the test keeps of a ray, in words: the axis behind each sheared axis, then doubles: the origin (sheared
 # axis by axis), the shear, and the direction on the longest axis.
@@ -45,8 +46,7 @@ def largest(a: wp.vec3d, b: wp.vec3d, c: wp.vec3d, axis: int):
 def watertight_doubles(lanes: SimpleNamespace, form: SimpleNamespace, kept: int) -> SimpleNamespace:
     """The test for these lanes and blocks, its ray kept from word `kept` of the stack."""
     length: int = lanes.triangles_length
-    vector, products = lanes.triangles, lanes.products
-    load, used, stride_of, vertex_at = form.load, form.used, form.stride, form.vertex_at
+    used, stride_of, vertex_at = form.used, form.stride, form.vertex_at
     store_word, load_word, stack_argument = lanes.store_word, lanes.load_word, lanes.stack_argument
     numbers = kept_numbers(lanes, "float64", kept + 3)
     store, load_kept = numbers.store, numbers.load
@@ -129,28 +129,17 @@ def watertight_doubles(lanes: SimpleNamespace, form: SimpleNamespace, kept: int)
 
     @without_gradient
     @wp.func
+    def kept_shear(stack: stack_argument, axis: int):
+        """The direction on a sheared axis over that on the longest."""
+        return load_kept(stack, 3 + axis)
+
+    edges = edges_in_lanes(lanes, form, axis_of, load_kept, kept_shear)
+
+    @without_gradient
+    @wp.func
     def candidates(units: wp.uint64, block: int, lane: int, stack: stack_argument):
         """The lanes whose triangle the ray's line may meet, one bit each; the second word is not used."""
-        x = axis_of(stack, 0)
-        y = axis_of(stack, 1)
-        z = axis_of(stack, 2)
-        ox = vector(load_kept(stack, 0))
-        oy = vector(load_kept(stack, 1))
-        oz = vector(load_kept(stack, 2))
-        sx = vector(load_kept(stack, 3))
-        sy = vector(load_kept(stack, 4))
-        za = load(units, block, lane, 0, z) - oz
-        zb = load(units, block, lane, 1, z) - oz
-        zc = load(units, block, lane, 2, z) - oz
-        xa = (load(units, block, lane, 0, x) - ox) - products(sx, za)
-        xb = (load(units, block, lane, 1, x) - ox) - products(sx, zb)
-        xc = (load(units, block, lane, 2, x) - ox) - products(sx, zc)
-        ya = (load(units, block, lane, 0, y) - oy) - products(sy, za)
-        yb = (load(units, block, lane, 1, y) - oy) - products(sy, zb)
-        yc = (load(units, block, lane, 2, y) - oy) - products(sy, zc)
-        u = products(xc, yb) - products(yc, xb)
-        v = products(xa, yc) - products(ya, xc)
-        w = products(xb, ya) - products(yb, xa)
+        u, v, w = edges(units, block, lane, stack)
         low = wp.min(wp.min(u, v), w)
         high = wp.max(wp.max(u, v), w)
         zero = wp.float64(0.0)

@@ -193,6 +193,17 @@ def surface_points(
 ) -> NDArray[np.float64]:
     """(n,3) points at uv (n,2) of triangles prim (n,), in double; NaN where there is no such triangle."""
 
+def points_on_rays(
+    vertices: NDArray[np.float64],
+    faces: NDArray[np.int32],
+    prim: NDArray[np.int32],
+    uv: NDArray[Real],
+    ray: NDArray[np.int64],
+    origins: NDArray[np.float64],
+    directions: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """(n,3) points where rays ray (n,) meet the planes of triangles prim (n,), at uv where they are flat."""
+
 def surface_normals(
     vertices: NDArray[Real], faces: NDArray[np.int32], prim: NDArray[np.int32]
 ) -> NDArray[np.float64]:

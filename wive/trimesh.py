@@ -11,15 +11,13 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
+from wive import _cpu
 from wive.precision import Floats, real_named
 from wive.scene import Scene
 
 Float64 = NDArray[np.float64]
 Int64 = NDArray[np.int64]
 
-# Of the sine of the angle between ray and triangle: below it a hit's place is taken from the triangle, as the
-# point where the ray meets its plane is uncertain.
-GRAZING = 1e-3
 # Along which lines rays leave a point, until those of both ways agree; the first is trimesh's.
 DIRECTIONS = (
     (0.4395064455, 0.617598629942, 0.652231566745),
@@ -110,12 +108,14 @@ class RayMeshIntersector:
         near, unit = _placed_rays(placed, origins, directions)
         if multiple_hits:
             found = placed.scene.intersect_all(near, unit, threads=self._threads)
-            ray, prim, uv = found.ray, found.prim, found.uv
-            depth = np.arange(len(prim)) - found.offsets[ray]
+            ray = found.ray
+            depth = np.arange(len(ray)) - found.offsets[ray]
+            if len(ray) and depth.max() < 1 << 16:
+                depth = depth.astype(np.uint16)  # which NumPy sorts by radix
             order = np.argsort(depth, kind="stable")
             if max_hits is not None:
                 order = order[: np.count_nonzero(depth < max_hits)]
-            ray, prim, uv = ray[order], prim[order], uv[order]
+            ray, prim, uv = ray[order], found.prim[order], found.uv[order]
         else:
             first = placed.scene.intersect(near, unit, threads=self._threads)
             (ray,) = np.nonzero(first.mask) if max_hits is None or max_hits > 0 else (np.zeros(0, np.int64),)
@@ -123,7 +123,7 @@ class RayMeshIntersector:
         triangles, rays = prim.astype(np.int64), ray.astype(np.int64)
         if not return_locations:
             return triangles, rays
-        return triangles, rays, self._locations(prim, uv, origins[ray], directions[ray])
+        return triangles, rays, self._locations(placed, (prim, uv, rays), origins, directions)
 
     def intersects_location(
         self, ray_origins: ArrayLike, ray_directions: ArrayLike, multiple_hits: bool = True
@@ -197,21 +197,16 @@ class RayMeshIntersector:
         return placed
 
     def _locations(
-        self, prim: NDArray[np.int32], uv: Floats, origins: Float64, directions: Float64
+        self,
+        placed: _Placed,
+        hits: tuple[NDArray[np.int32], Floats, Int64],
+        origins: Float64,
+        directions: Float64,
     ) -> Float64:
         """(m,3) where rays meet the planes of the triangles they hit, in the mesh's own float64."""
-        corners = np.asarray(self.mesh.vertices, np.float64)[np.asarray(self.mesh.faces)[prim]]
-        v0, v1, v2 = corners.swapaxes(0, 1)
-        normals = np.cross(v1 - v0, v2 - v0)
-        slopes = np.sum(normals * directions, axis=1)
-        with np.errstate(all="ignore"):
-            t = np.sum(normals * (v0 - origins), axis=1) / slopes
-            on_ray = origins + t[:, None] * directions
-        u, v = uv.astype(np.float64).T[:, :, None]
-        on_triangle = (1 - u - v) * v0 + u * v1 + v * v2
-        sizes = np.linalg.norm(normals, axis=1) * np.linalg.norm(directions, axis=1)
-        points: Float64 = np.where((abs(slopes) > GRAZING * sizes)[:, None], on_ray, on_triangle)
-        return points
+        prim, uv, ray = hits
+        vertices = np.ascontiguousarray(self.mesh.vertices, np.float64)
+        return _cpu.points_on_rays(vertices, placed.scene.faces, prim, uv, ray, origins, directions)
 
     def __getstate__(self) -> dict[str, Any]:
         """All but the tree, which is built again."""
@@ -237,7 +232,8 @@ def _rays(ray_origins: ArrayLike, ray_directions: ArrayLike) -> tuple[Float64, F
             f"got {origins.shape} and {directions.shape}"
         )
     with np.errstate(invalid="ignore", divide="ignore"):
-        return origins, directions / np.linalg.norm(directions, axis=1, keepdims=True)
+        lengths = np.sqrt(np.einsum("ij,ij->i", directions, directions))
+        return np.ascontiguousarray(origins), directions / lengths[:, None]
 
 
 def _placed_rays(placed: _Placed, origins: Float64, directions: Float64) -> tuple[Float64, Float64]:
