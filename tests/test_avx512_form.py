@@ -3,6 +3,7 @@
 import os
 import subprocess
 import sys
+import tempfile
 from typing import Literal
 
 import numpy as np
@@ -43,6 +44,7 @@ print(_cpu.avx512_form(), digest.hexdigest())
 def run(program: str, form: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
         [sys.executable, "-c", program],
+        cwd=tempfile.gettempdir(),  # the source folder would hide an installed wive
         env={**os.environ, VARIABLE: form},
         capture_output=True,
         text=True,
