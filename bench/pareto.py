@@ -1,12 +1,13 @@
 """Speed against error: accuracies, node forms and float64, Embree's fast and robust modes, wp.mesh_query_ray.
 
 A closed sphere of 81,920 triangles at five scales and five places. `leaks`: the share of rays aimed from
-inside at its vertices and edges that miss. `wrong`: of rays in any direction, the share whose triangle is not
-that of accuracy "exact" on the scalar backend, which the tests hold to exact rationals. `t_median`,
-`t_worst`: the error of t in units in the last place, where the triangle is right, against t in double. Speed
-is of the latter rays on the unmoved sphere of radius 1, all contenders in turn on one core; `mrays` with as
-many rays in flight as a batch gets, `single` with one. Tables give shares in millionths (ppm). `float64` is
-"watertight" over the same numbers as float64 vertices and rays.
+inside at its vertices and edges that miss. `wrong`: of rays in any direction, the share whose triangle is
+not that of accuracy "exact" on the scalar backend, which the tests hold to exact rationals. `t_median`,
+`t_worst`: the error of t in units in the last place, where the triangle is right, against t in double.
+Speed is of the latter rays on the unmoved sphere of radius 1, all contenders in turn on one core; `mrays`
+with as many rays in flight as a batch gets, `single` with one; then ours on scenes, `kept`: of the speed of
+fast. Tables give shares in millionths (ppm). `float64` is "watertight" over the same numbers as float64
+vertices and rays.
 """
 
 import argparse
@@ -17,9 +18,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench import report
+from bench.options import scene_parser
 from bench.pareto_contenders import CONTENDERS, Array, Contender, contenders, exact_prims
 from bench.pareto_figure import draw
-from bench.timing import QUICK, Effort, compare_in_turn, one_core, timed
+from bench.pareto_scenes import COLUMNS as SCENE_COLUMNS
+from bench.pareto_scenes import MEAN_COLUMNS, mean_rows, names_of, scene_rows
+from bench.scenes import SceneFolder
+from bench.speeds import speeds
+from bench.timing import QUICK, Effort
 
 SUBDIVISIONS, QUICK_SUBDIVISIONS = 6, 4
 SCALES = (1e-6, 1e-3, 1.0, 1e3, 1e6)
@@ -46,6 +52,9 @@ class Case(NamedTuple):
 def main(options: Sequence[str]) -> None:
     """Runs the bench with command-line options."""
     chosen = parse_options(options)
+    folder = SceneFolder(chosen.scene_dir)
+    names = names_of(folder, chosen.scenes, chosen.quick)
+    effort = QUICK if chosen.quick else EFFORT
     sweep = [(scale, 0.0) for scale in SCALES] + [(1.0, place) for place in PLACES]
     plain = sweep.index((1.0, 0.0))
     if chosen.quick:
@@ -60,7 +69,7 @@ def main(options: Sequence[str]) -> None:
             rows.append({"contender": one.name, "scale": asked.scale, "place": asked.place})
             rows[-1] |= errors(one, asked, right, exact_t)
         if number == plain:
-            speed = speeds(found, asked.free, QUICK if chosen.quick else EFFORT)
+            speed = speeds(found, asked.free, effort)
         for one in found:
             one.release()
         report.print_progress({"scale": asked.scale, "place": asked.place}, ("scale", "place"))
@@ -71,6 +80,10 @@ def main(options: Sequence[str]) -> None:
     )
     for name in missing:
         print(f"not here: {name}")
+    scenes = [row for name in names for row in scene_rows(folder.load(name), chosen.quick, effort)]
+    scene_means = mean_rows(scenes)
+    report.print_table(scenes, SCENE_COLUMNS, "On scenes: Mray/s, and what is kept of the speed of fast")
+    report.print_table(scene_means, MEAN_COLUMNS, "Kept of the speed of fast, over scenes and rays")
     cost = float64_cost(speed)
     print(f"float64 / float32, both watertight: {cost['mrays']:.3f} in flight, {cost['single']:.3f} single")
     content = {
@@ -79,8 +92,11 @@ def main(options: Sequence[str]) -> None:
         "missing": missing,
         "triangles": len(cases[0].faces),
         "float64_to_float32": cost,
+        "scenes": scenes,
+        "scene_means": scene_means,
     }
-    report.save("pareto", content, draw(means, rows), chosen.out, whole=not chosen.quick)
+    whole = not chosen.quick and not chosen.scenes
+    report.save("pareto", content, draw(means, rows), chosen.out, whole=whole)
 
 
 def case(scale: float, place: float, quick: bool) -> Case:
@@ -150,22 +166,6 @@ def in_ppm(rows: Sequence[report.Row]) -> list[report.Row]:
     return [{**row, **{f"{key}_ppm": 1e6 * row[key] for key in ("leaks", "wrong")}} for row in rows]
 
 
-def speeds(found: Sequence[Contender], rays: tuple[Array, Array], effort: Effort) -> dict[str, report.Row]:
-    """Mray/s by contender, all traced in turn; `single` is None for those that always trace one by one."""
-    ways = [(one.name, "mrays", one.trace) for one in found]
-    ways += [(one.name, "single", one.trace_single) for one in found if one.trace_single]
-    rows: dict[str, report.Row] = {one.name: {"contender": one.name, "single": None} for one in found}
-    runs = [timed(lambda trace=trace: trace(*rays)) for *_, trace in ways]  # type: ignore[misc]
-    with one_core():
-        for run in runs:
-            run()
-        outcomes = compare_in_turn(runs, effort)
-    for (name, column, _), outcome in zip(ways, outcomes, strict=True):
-        rows[name][column] = len(rays[0]) / outcome.our_seconds * 1e-6
-        rows[name][f"{column}_ratio"] = outcome.ratio  # to the first contender's, wive fast in flight
-    return rows
-
-
 def float64_cost(speed: dict[str, report.Row]) -> dict[str, float]:
     """Speed of float64 by that of float32, in flight and one by one."""
     double, single = speed["float64"], speed["watertight"]
@@ -174,8 +174,6 @@ def float64_cost(speed: dict[str, report.Row]) -> dict[str, float]:
 
 def parse_options(options: Sequence[str]) -> argparse.Namespace:
     """The command line's choices."""
-    from bench.options import result_parser
-
-    parser = result_parser("pareto", __doc__)
+    parser = scene_parser("pareto", __doc__)
     parser.epilog = "contenders: " + ", ".join(CONTENDERS)
     return parser.parse_args(options)

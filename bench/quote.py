@@ -243,6 +243,14 @@ def pareto_means(content: report.Row) -> str:
     return markdown(["contender", *heads], lines)
 
 
+def pareto_scenes(content: report.Row) -> str:
+    """What each keeps of the speed of `fast` on scenes."""
+    keys = ("mean_mrays", "lowest_mrays", "mean_single", "lowest_single")
+    lines = [[row["contender"], *(f"{row[key]:.2f}" for key in keys)] for row in content["scene_means"]]
+    heads = ["in flight, geometric mean", "lowest", "one ray, geometric mean", "lowest"]
+    return markdown(["contender", *heads], lines)
+
+
 TABLES: dict[str, Table] = {
     "embree.avx512_in_flight": embree_speed("avx512", "tuned"),
     "embree.avx512_one_ray": embree_speed("avx512", 1),
@@ -258,4 +266,5 @@ TABLES: dict[str, Table] = {
     "order.means": order_means,
     "order.scenes": order_scenes,
     "pareto.means": pareto_means,
+    "pareto.scenes": pareto_scenes,
 }
