@@ -44,6 +44,17 @@ py::array_t<double> each_hit(const Array<Real>& vertices, const Array<std::int32
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 
+double on_triangle(const double (&corner)[3][3], double u, double v, int axis) {
+    return (1 - u - v) * corner[0][axis] + u * corner[1][axis] + v * corner[2][axis];
+}
+
+// (v1 - v0) x (v2 - v0), along one axis.
+double normal_along(const double (&corner)[3][3], int axis) {
+    const int i = (axis + 1) % 3, j = (axis + 2) % 3;
+    return (corner[1][i] - corner[0][i]) * (corner[2][j] - corner[0][j]) -
+           (corner[1][j] - corner[0][j]) * (corner[2][i] - corner[0][i]);
+}
+
 template <class Real>
 py::array_t<double> points(const Array<Real>& vertices, const Array<std::int32_t>& faces, const Array<std::int32_t>& prim,
                            const Array<Real>& uv) {
@@ -53,7 +64,7 @@ py::array_t<double> points(const Array<Real>& vertices, const Array<std::int32_t
     return each_hit(vertices, faces, prim, [=](std::size_t i, bool known, const double (&corner)[3][3], double* out) {
         const double u = weights[2 * i], v = weights[2 * i + 1];
         for (int axis = 0; axis < 3; ++axis)
-            out[axis] = known ? (1 - u - v) * corner[0][axis] + u * corner[1][axis] + v * corner[2][axis] : nan;
+            out[axis] = known ? on_triangle(corner, u, v, axis) : nan;
     });
 }
 
@@ -61,12 +72,7 @@ template <class Real>
 py::array_t<double> normals(const Array<Real>& vertices, const Array<std::int32_t>& faces,
                             const Array<std::int32_t>& prim) {
     return each_hit(vertices, faces, prim, [](std::size_t, bool known, const double (&corner)[3][3], double* out) {
-        double a[3], b[3];
-        for (int axis = 0; axis < 3; ++axis) {
-            a[axis] = corner[1][axis] - corner[0][axis];
-            b[axis] = corner[2][axis] - corner[0][axis];
-        }
-        const double across[3] = {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+        const double across[3] = {normal_along(corner, 0), normal_along(corner, 1), normal_along(corner, 2)};
         const double length = std::sqrt(across[0] * across[0] + across[1] * across[1] + across[2] * across[2]);
         for (int axis = 0; axis < 3; ++axis) out[axis] = known ? across[axis] / length : nan;
     });
@@ -95,21 +101,18 @@ py::array_t<double> points_on_rays(const Array<double>& vertices, const Array<st
             return;
         }
         const double *o = from + 3 * index, *d = along + 3 * index;
-        double across[3], slope = 0, height = 0, area = 0, length = 0;
+        double slope = 0, height = 0, area = 0, length = 0;
         for (int axis = 0; axis < 3; ++axis) {
-            const int j = (axis + 1) % 3, k = (axis + 2) % 3;
-            across[axis] = (corner[1][j] - corner[0][j]) * (corner[2][k] - corner[0][k]) -
-                           (corner[1][k] - corner[0][k]) * (corner[2][j] - corner[0][j]);
-            slope += across[axis] * d[axis];
-            height += across[axis] * (corner[0][axis] - o[axis]);
-            area += across[axis] * across[axis];
+            const double across = normal_along(corner, axis);
+            slope += across * d[axis];
+            height += across * (corner[0][axis] - o[axis]);
+            area += across * across;
             length += d[axis] * d[axis];
         }
         const double u = weights[2 * i], v = weights[2 * i + 1], t = height / slope;
         const bool steep = std::abs(slope) > grazing * std::sqrt(area) * std::sqrt(length);
         for (int axis = 0; axis < 3; ++axis)
-            out[axis] = steep ? o[axis] + t * d[axis]
-                              : (1 - u - v) * corner[0][axis] + u * corner[1][axis] + v * corner[2][axis];
+            out[axis] = steep ? o[axis] + t * d[axis] : on_triangle(corner, u, v, axis);
     });
 }
 

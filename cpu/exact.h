@@ -3,8 +3,9 @@
 #pragma once
 
 #include <array>
-#include <cmath>
 #include <cstddef>
+
+#include "error_free.h"
 
 namespace wive {
 
@@ -19,8 +20,7 @@ int sign_of_sum(const std::array<double, count>& terms) {
         for (std::size_t i = 0; i < size; ++i) {
             const double a = sum, b = expansion[i];
             sum = a + b;
-            const double b_part = sum - a;
-            const double error = (a - (sum - b_part)) + (b - b_part);  // Knuth's two-sum
+            const double error = rounded_off_sum(a, b, sum);
             if (error != 0) expansion[kept++] = error;
         }
         if (sum != 0 || kept == 0) expansion[kept++] = sum;
@@ -37,7 +37,7 @@ inline int orientation(const double a[2], const double b[2], const double c[2]) 
     std::size_t count = 0;
     const auto add_product = [&](double x, double y) {  // and what rounding it takes off
         terms[count] = x * y;
-        terms[count + 1] = std::fma(x, y, -terms[count]);
+        terms[count + 1] = rounded_off_product(x, y, terms[count]);
         count += 2;
     };
     add_product(a[0], b[1]), add_product(-a[1], b[0]);

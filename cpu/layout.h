@@ -9,6 +9,7 @@ namespace wive {
 
 inline constexpr int node_width = 8;
 inline constexpr int block_width = 4;
+inline constexpr std::size_t unit_bytes = 32;  // what child references count in
 
 // What a scene's numbers are: vertices, rays, t, u and v. Boxes are float32 in either. In templates: Real, float or double.
 enum class Precision { float32, float64 };
@@ -39,7 +40,7 @@ struct alignas(32) TriangleBlockOf {
     [[gnu::always_inline]] Real vertex(int k, int axis, int lane) const { return rows[3 * k + axis][lane]; }  // but in `fast` trees
     [[gnu::always_inline]] std::int32_t prim_at(int lane) const { return prim[lane]; }
     [[gnu::always_inline]] const TriangleBlockOf* next() const { return this + 1; }
-    [[gnu::always_inline]] static std::size_t units() { return sizeof(TriangleBlockOf) / 32; }
+    [[gnu::always_inline]] static constexpr std::size_t units() { return sizeof(TriangleBlockOf) / unit_bytes; }
 };
 using TriangleBlock = TriangleBlockOf<float>;
 static_assert(sizeof(TriangleBlock) == 160 && sizeof(TriangleBlockOf<double>) == 320);
@@ -48,11 +49,10 @@ static_assert(sizeof(TriangleBlock) == 160 && sizeof(TriangleBlockOf<double>) ==
 enum class NodeForm { float32, compressed };
 inline constexpr int node_form_count = 2;
 
-// Nodes and blocks stand in one piece of memory, first the nodes, then the blocks, counted in units of 32 bytes:
+// Nodes and blocks stand in one piece of memory, first the nodes, then the blocks, counted in units of unit_bytes:
 // a node is eight units, a block five (compressed: four, and three or four; of doubles ten, whatever the nodes). A child reference holds the unit where the child begins, times eight; a
 // leaf sets leaf_bit and puts its number of blocks, less one, in the low three bits. So one mask and one shift lead
 // to a child of either kind.
-inline constexpr std::size_t unit_bytes = 32;
 inline constexpr std::size_t max_units = std::size_t{1} << 28;
 inline constexpr std::uint32_t leaf_bit = 0x80000000u;
 inline constexpr int max_leaf_blocks = 8;

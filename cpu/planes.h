@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "error_free.h"
 #include "interval.h"
 
 namespace wive {
@@ -15,8 +16,8 @@ inline float plane_below(float plane, float center) {
 }
 // The difference of doubles is rounded as well: what that took off decides where the rest is a float.
 inline float plane_below(double plane, float center) {
-    const double b = -static_cast<double>(center), p = plane + b, b_part = p - plane;
-    const double rest = (plane - (p - b_part)) + (b - b_part);  // Knuth's two-sum
+    const double b = -static_cast<double>(center), p = plane + b;
+    const double rest = rounded_off_sum(plane, b, p);
     const float below = float_below(p);
     return static_cast<double>(below) == p && rest < 0 ? std::nextafter(below, -std::numeric_limits<float>::infinity()) : below;
 }

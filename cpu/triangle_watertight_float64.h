@@ -9,20 +9,17 @@
 
 #include <cstddef>
 
+#include "error_free.h"
 #include "frame.h"
 
 namespace wive {
 
-// The part of x y that rounding takes off: exact where it does not underflow, |x y| being zero or above 2^-916.
-[[gnu::always_inline]] inline double rounded_off(double x, double y, double product) { return __builtin_fma(x, y, -product); }
-
 // x1 y2 - y1 x2 with the exact sign, and zero only where it is zero: the sum of two products and of what was rounded off.
 [[gnu::always_inline]] inline double exact_weight(double x1, double y1, double x2, double y2) {
     const double a = x1 * y2, b = y1 * x2;
-    const double a_low = rounded_off(x1, y2, a), b_low = -rounded_off(y1, x2, b);
-    const double low = a_low + b_low, b_part = low - a_low;
-    const double lowest = (a_low - (low - b_part)) + (b_low - b_part);  // Knuth's two-sum
-    return ((a - b) + low) + lowest;
+    const double a_low = rounded_off_product(x1, y2, a), b_low = -rounded_off_product(y1, x2, b);
+    const double low = a_low + b_low;
+    return ((a - b) + low) + rounded_off_sum(a_low, b_low, low);
 }
 
 // Lanes of a block that may be hit, in which no weight has the wrong sign: t, u, v and the lanes that are hit.

@@ -7,6 +7,7 @@
 #include <cstring>
 #include <utility>
 
+#include "error_free.h"
 #include "ray.h"
 
 namespace wive {
@@ -23,10 +24,9 @@ constexpr int lowest_exponent = -110;
 struct Distance {
     double rounded, rest;
 
-    Distance(float origin, float plane) : rounded(static_cast<double>(plane) - static_cast<double>(origin)) {
-        const double a = plane, b = -static_cast<double>(origin), b_part = rounded - a;
-        rest = (a - (rounded - b_part)) + (b - b_part);  // Knuth's two-sum
-    }
+    Distance(float origin, float plane)
+        : rounded(static_cast<double>(plane) - static_cast<double>(origin)),
+          rest(rounded_off_sum(plane, -static_cast<double>(origin), rounded)) {}
     // The highest multiple that is not above the plane, the lowest that is not below it. No plane lies below the
     // origin, and none more than a few hundred steps above it, so truncating is floor.
     int steps_below(double step) const {

@@ -168,8 +168,6 @@ def lanes(value: object, on_warp: bool) -> Lanes | None:
 
 def limits(name: str, value: ArrayLike, count: int, real: Real = FLOAT32) -> Floats:
     """The limits of `count` rays, (1,) or (count,) of `real`'s dtype."""
-    if type(value) is float and value in real.limits:
-        return real.limits[value]
     array = _numeric(name, value, "a real number or one per ray", "fiu")
     if array.shape not in ((), (count,)):
         raise ValueError(
