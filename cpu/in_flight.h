@@ -47,6 +47,14 @@ public:
     }
 
 private:
+    // A block some of whose triangles a flight may hit.
+    struct Candidate {
+        State* flight;
+        const typename Form::Block* block;
+        bool last_block;
+        typename Triangles<Isa>::Found found;
+    };
+
     // One past the last flight of each queue: flights that wait for the same kind of step stand together, so that
     // each kind has a loop to itself and no step has to ask.
     struct Ends {
@@ -73,19 +81,19 @@ private:
         *ends_.node++ = &f;
     }
 
-    // The child on top is next, unless it may be hidden, which a leaf that was begun may not: prefetched now, and waited
-    // for in the right queue. Written to all three, and counted in one: no branch.
-    [[gnu::always_inline]] static void wait(const BvhView& bvh, State& f, Stack::Top top, bool may_hide, Ends& ends) {
+    // The child on top is next, unless it may be hidden, which a leaf that was begun may not: prefetched now and, where
+    // nothing is left to be done before, waited for in the right queue. Written to all three, and counted in one: no branch.
+    [[gnu::always_inline]] static void wait(const BvhView& bvh, State& f, Stack::Top top, bool may_hide, bool ready, Ends& ends) {
         if constexpr (Query::in_order)
             while (may_hide & (top.distance() > f.query.interval.reach())) top.move(-1);
         f.top = top;
         const std::uint32_t child = top.child();
         prefetch<Form>(bvh, child);
-        const std::ptrdiff_t inner = is_inner(child), end = child == end_of_stack;
+        const bool inner = is_inner(child), end = child == end_of_stack;
         *ends.node = *ends.leaf = *ends.done = &f;
-        ends.node += inner;
-        ends.leaf += 1 - inner - end;
-        ends.done += end;
+        ends.node += ready & inner;
+        ends.leaf += ready & !inner & !end;
+        ends.done += ready & end;
     }
 
     [[gnu::always_inline]] void visit_nodes() {
@@ -97,16 +105,19 @@ private:
             Stack::Top top = f.top;
             f.counters.inner_node();
             visit<Query::in_order>(bvh.template node<Form>(top.child()), Slabs<Isa>(f.ray), f.query.interval.reach(), top);
-            wait(bvh, f, top, true, ends);
+            wait(bvh, f, top, true, true, ends);
         }
         ends_ = ends;
     }
 
     // One block a turn: a leaf of several stays on top, so that the next one is prefetched, and no loop has to be left.
+    // First all blocks are asked which of their triangles may be hit; then those few are solved, one after the other
+    // without a guess whether there is anything to solve; and only then do their rays know what to do next.
     [[gnu::always_inline]] void test_leaves() {
         const BvhView bvh = bvh_;
         State** const last = ends_.leaf;
         Ends ends = {ends_.node, at_leaf_, ends_.done};
+        Candidate* end = candidates_;
         for (State** i = at_leaf_; i != last; ++i) {
             State& f = **i;
             Stack::Top top = f.top;
@@ -114,16 +125,24 @@ private:
             const auto& block = *bvh.template leaf<Form>(child);
             const bool last_block = leaf_block_count(child) == 1;
             f.counters.block(block);
-            const bool finished = Triangles<Isa>(f.ray).test(Corners(block), f.query);
+            if (last_block) f.counters.leaf();
             top.child() = without_first_block(child, block.units());  // no matter if it was the last: above the top then
             top.move(-static_cast<std::ptrdiff_t>(last_block));
-            if (last_block || finished) f.counters.leaf();
-            if (finished) {
-                top = Stack::Top(f.stack);
-                top.move(-1);
-            }
-            wait(bvh, f, top, last_block, ends);
+            *end = {&f, &block, last_block, Triangles<Isa>(f.ray).find(Corners(block))};
+            const bool found = end->found.lanes != 0;
+            end += found;
+            wait(bvh, f, top, last_block, !found, ends);
         }
+        for (const Candidate* c = candidates_; c != end; ++c) {
+            State& f = *c->flight;
+            if (Triangles<Isa>(f.ray).solve(Corners(*c->block), c->found, f.query)) {
+                f.top = Stack::Top(f.stack);
+                f.top.move(-1);
+                if (!c->last_block) f.counters.leaf();
+            }
+        }
+        for (const Candidate* c = candidates_; c != end; ++c)
+            wait(bvh, *c->flight, c->flight->top, c->last_block, true, ends);
         ends_ = ends;
     }
 
@@ -144,6 +163,7 @@ private:
     const RaySource source_;
     State* flights_;
     State *at_node_[max_in_flight + 1], *at_leaf_[max_in_flight + 1], *done_[max_in_flight + 1];
+    Candidate candidates_[max_in_flight + 1];
     Ends ends_ = {at_node_, at_leaf_, done_};
     std::size_t next_ = 0, end_ = 0;
 };
@@ -155,7 +175,7 @@ void trace_batch(const BvhView& bvh, const RayBatch<typename Isa::Real>& rays,
     if (in_flight <= 1)
         trace_one_by_one<Isa, Slabs, Triangles, Query, Counters>(bvh, rays, hits, source);
     else
-        InFlight<Isa, Slabs, Triangles, Query, Counters>(bvh, rays, hits, source, scratch).trace(in_flight);
+        InFlight<Isa, Slabs, Triangles, typename Query::InFlight, Counters>(bvh, rays, hits, source, scratch).trace(in_flight);
 }
 
 }  // namespace wive

@@ -44,7 +44,7 @@ struct KernelMaker {
     struct Kernel {
         static constexpr TraceBatch<Real> trace =
             trace_batch<Isa, Slabs, Triangles, Query, std::conditional_t<counting, StepCounters, NoCounters>>;
-        static constexpr std::size_t flight_bytes = sizeof(Flight<typename Triangles<Isa>::Frame, Query, StepCounters>);
+        static constexpr std::size_t flight_bytes = sizeof(Flight<typename Triangles<Isa>::Frame, typename Query::InFlight, StepCounters>);
     };
     struct NoKernel {
         static constexpr TraceBatch<Real> trace = nullptr;

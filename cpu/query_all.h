@@ -10,6 +10,7 @@ namespace wive {
 // How many triangles a ray meets in [tmin, tmax].
 template <class Real>
 struct CountHits {
+    using InFlight = CountHits;
     static constexpr bool in_order = false;  // all are wanted, whichever comes first
     static constexpr bool crossings = true;  // how often a ray passes a surface must come out right
 
@@ -32,6 +33,7 @@ struct CountHits {
 // Each of them, added to the thread's list.
 template <class Real>
 struct AllHits {
+    using InFlight = AllHits;
     static constexpr bool in_order = false;
     static constexpr bool crossings = true;
 

@@ -11,12 +11,13 @@ namespace wive {
 // order of what it does not make equal; what it does is compared exactly, so the best hit's triangle is remembered.
 template <class Block>
 struct ExactClosestHit {
+    using InFlight = ExactClosestHit;
     static constexpr bool in_order = true;
     static constexpr bool crossings = false;
     static constexpr bool wants_uv = true;
 
     Interval<float> interval{};  // for the boxes, in the frame's units; ends at the best hit
-    HitNumbers best{};
+    HitNumbers best{std::numeric_limits<float>::infinity(), 0, 0};
     std::uint32_t prim = no_prim;
     const Block* block = nullptr;
     int lane = 0;

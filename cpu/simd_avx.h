@@ -88,6 +88,9 @@ struct SseFloat4 {
     WIVE_INLINE friend unsigned less_equal(SseFloat4 a, SseFloat4 b) {
         return static_cast<unsigned>(_mm_movemask_ps(_mm_cmp_ps(a.v, b.v, _CMP_LE_OQ)));
     }
+    WIVE_INLINE friend unsigned less(SseFloat4 a, SseFloat4 b) {
+        return static_cast<unsigned>(_mm_movemask_ps(_mm_cmp_ps(a.v, b.v, _CMP_LT_OQ)));
+    }
     // Lanes where a <= b, c <= d and e < f.
     WIVE_INLINE friend unsigned all_in_order(SseFloat4 a, SseFloat4 b, SseFloat4 c, SseFloat4 d, SseFloat4 e, SseFloat4 f) {
         const __m128 ab = _mm_cmp_ps(a.v, b.v, _CMP_LE_OQ), cd = _mm_cmp_ps(c.v, d.v, _CMP_LE_OQ);

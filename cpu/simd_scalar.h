@@ -77,6 +77,11 @@ struct ScalarLanes {
         for (int i = 0; i < width; ++i) bits |= static_cast<unsigned>(a.v[i] <= b.v[i]) << i;
         return bits;
     }
+    WIVE_INLINE friend unsigned less(ScalarLanes a, ScalarLanes b) {
+        unsigned bits = 0;
+        for (int i = 0; i < width; ++i) bits |= static_cast<unsigned>(a.v[i] < b.v[i]) << i;
+        return bits;
+    }
     WIVE_INLINE friend unsigned all_in_order(ScalarLanes a, ScalarLanes b, ScalarLanes c, ScalarLanes d, ScalarLanes e,
                                              ScalarLanes f) {
         unsigned bits = 0;

@@ -51,7 +51,10 @@ template <class Corners, class Triangles, class Query, class Counters>
                                              const Triangles& triangles, Query& query, Counters& counters) {
     for (; count > 0; --count, block = block->next()) {
         counters.block(*block);
-        if (triangles.test(Corners(*block), query)) return true;
+        const Corners corners(*block);
+        const auto found = triangles.find(corners);
+        if (found.lanes != 0) [[unlikely]]
+            if (triangles.solve(corners, found, query)) return true;
     }
     return false;
 }

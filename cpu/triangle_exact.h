@@ -64,10 +64,16 @@ public:
 
     [[gnu::always_inline]] explicit ExactTriangles(const Frame& ray) : ray_(ray) {}
 
-    // Offers every hit of the block to the query; true once the query is done.
-    template <class BlockCorners, class Query>
-    [[gnu::always_inline]] bool test(const BlockCorners& corners, Query& query) const {
+    // The lanes of a block that may be hit, and what solve() needs to say where.
+    struct Found {
+        unsigned lanes;
         Double4 x[3], y[3], z[3], weight[3];
+    };
+
+    template <class BlockCorners>
+    [[gnu::always_inline]] Found find(const BlockCorners& corners) const {
+        Found found;
+        auto& [lanes, x, y, z, weight] = found;
         const Double4 shear_x = Double4::all(ray_.shear[0]), shear_y = Double4::all(ray_.shear[1]);
         for (unsigned k = 0; k < 3; ++k) {
             const auto away = [&](int i) { return widen(corners.vertex(k, ray_.axis[i])) - Double4::all(ray_.from[i]); };
@@ -79,15 +85,60 @@ public:
             const int i = (k + 1) % 3, j = (k + 2) % 3;
             weight[k] = x[i] * y[j] - y[i] * x[j];
         }
-        const Double4 low = min(min(weight[0], weight[1]), weight[2]);
-        const Double4 high = max(max(weight[0], weight[1]), weight[2]);
-        const unsigned lanes =
-            corners.used(less_equal(Double4::all(-ray_.bound), low) | less_equal(high, Double4::all(ray_.bound)));
-        if (lanes == 0) [[likely]] return false;
-        return solve(corners.block, lanes, x, y, z, weight, low, high, query);
+        const Double4 low = lowest(weight), high = highest(weight);
+        lanes = corners.used(less_equal(Double4::all(-ray_.bound), low) | less_equal(high, Double4::all(ray_.bound)));
+        return found;
+    }
+
+    // Offers the hits to the query; true once the query is done.
+    template <class BlockCorners, class Query>
+    [[gnu::always_inline]] bool solve(const BlockCorners& corners, const Found& found, Query& query) const {
+        const auto& [may_be_hit, x, y, z, weight] = found;
+        const Double4 low = lowest(weight), high = highest(weight), near = lowest(z), far = highest(z);
+        constexpr double e = 0x1p-53;
+        // The error of these weights: e (r + 4 e Z) (13 r + 21 Z).
+        const Double4 along = max(abs(near), abs(far));
+        Double4 aside = max(abs(x[0]), abs(y[0]));
+        for (int k = 1; k < 3; ++k) aside = max(aside, max(abs(x[k]), abs(y[k])));
+        const Double4 error = (aside + Double4::all(4 * e) * along) *
+                              (Double4::all(13 * e) * aside + Double4::all(21 * e) * along);
+        const Double4 minus_error = Double4::all(0.0) - error;
+        unsigned lanes = may_be_hit & (less_equal(minus_error, low) | less_equal(high, error));
+        if (lanes == 0) return false;
+
+        const unsigned on_edge = less_equal(low, error) & less_equal(minus_error, high);  // maybe
+        const Double4 share = Double4::all(1.0) / (weight[0] + weight[1] + weight[2]);
+        const Double4 depth = (weight[0] * z[0] + weight[1] * z[1] + weight[2] * z[2]) * share;
+        const Double4 weight_error = Double4::all(6.0) * error * abs(share);
+        const Double4 depth_error = weight_error * (far - near) + Double4::all(12 * e) * along;
+        const Double4 inverse = Double4::all(ray_.inverse);
+        const Rounded t(depth * inverse, depth_error * abs(inverse));
+        // Most doubts are about where a ray meets the surface that it leaves from, which does not matter.
+        lanes &= on_edge | ~(less(t.high, Float4::all(ray_.given_tmin)) | less(Float4::all(farthest(query)), t.low));
+        if (lanes == 0) return false;
+
+        alignas(16) float ts[4], us[4] = {}, vs[4] = {};
+        unsigned doubt = on_edge | t.store(ts);
+        if constexpr (Query::wants_uv) {
+            doubt |= Rounded(weight[1] * share, weight_error).store(us);
+            doubt |= Rounded(weight[2] * share, weight_error).store(vs);
+        }
+        for (; lanes != 0; lanes &= lanes - 1) {
+            const int lane = __builtin_ctz(lanes);
+            HitNumbers hit = {ts[lane], us[lane], vs[lane]};
+            if (doubt >> lane & 1u) [[unlikely]] {
+                if (!hits_exactly(ray_.given(), corners_of(corners.block, lane), Query::crossings, hit)) continue;
+            }
+            if (!within_limits(corners.block, lane, hit.t)) continue;
+            if (offer(corners.block, lane, hit, query)) return true;
+        }
+        return false;
     }
 
 private:
+    [[gnu::always_inline]] static Double4 lowest(const Double4 (&a)[3]) { return min(min(a[0], a[1]), a[2]); }
+    [[gnu::always_inline]] static Double4 highest(const Double4 (&a)[3]) { return max(max(a[0], a[1]), a[2]); }
+
     template <class Block>
     [[gnu::noinline]] static Corners corners_of(const Block& block, int lane) {
         Corners one;
@@ -95,51 +146,25 @@ private:
         return one;
     }
 
-    template <class Block, class Query>
-    [[gnu::always_inline]] bool solve(const Block& block, unsigned lanes, const Double4 (&x)[3], const Double4 (&y)[3],
-                                      const Double4 (&z)[3], const Double4 (&weight)[3], Double4 low, Double4 high,
-                                      Query& query) const {
-        constexpr double e = 0x1p-53;
-        // The error of these weights: e (r + 4 e Z) (13 r + 21 Z).
-        const Double4 near = min(min(z[0], z[1]), z[2]), far = max(max(z[0], z[1]), z[2]);
-        const Double4 along = max(abs(near), abs(far));
-        Double4 aside = max(abs(x[0]), abs(y[0]));
-        for (int k = 1; k < 3; ++k) aside = max(aside, max(abs(x[k]), abs(y[k])));
-        const Double4 error = (aside + Double4::all(4 * e) * along) *
-                              (Double4::all(13 * e) * aside + Double4::all(21 * e) * along);
-        const Double4 minus_error = Double4::all(0.0) - error;
-        lanes &= less_equal(minus_error, low) | less_equal(high, error);
-        if (lanes == 0) return false;
+    // What numbers within the error of x round to.
+    struct Rounded {
+        Float4 low, high;
 
-        unsigned doubt = less_equal(low, error) & less_equal(minus_error, high);
-        const Double4 share = Double4::all(1.0) / (weight[0] + weight[1] + weight[2]);
-        const Double4 depth = (weight[0] * z[0] + weight[1] * z[1] + weight[2] * z[2]) * share;
-        const Double4 weight_error = Double4::all(6.0) * error * abs(share);
-        const Double4 depth_error = weight_error * (far - near) + Double4::all(12 * e) * along;
-        alignas(16) float ts[4], us[4] = {}, vs[4] = {};
-        const Double4 inverse = Double4::all(ray_.inverse);
-        doubt |= round(depth * inverse, depth_error * abs(inverse), ts);
-        if constexpr (Query::wants_uv) {
-            doubt |= round(weight[1] * share, weight_error, us);
-            doubt |= round(weight[2] * share, weight_error, vs);
+        [[gnu::always_inline]] Rounded(Double4 x, Double4 error) : low(Float4::narrow(x - error)), high(Float4::narrow(x + error)) {}
+        // Returns the lanes in doubt.
+        [[gnu::always_inline]] unsigned store(float (&rounded)[4]) const {
+            (low + Float4::all(0.0f)).store(rounded);  // no -0
+            return ~equal(low, high);
         }
-        for (; lanes != 0; lanes &= lanes - 1) {
-            const int lane = __builtin_ctz(lanes);
-            HitNumbers hit = {ts[lane], us[lane], vs[lane]};
-            if (doubt >> lane & 1u) [[unlikely]] {
-                if (!hits_exactly(ray_.given(), corners_of(block, lane), Query::crossings, hit)) continue;
-            }
-            if (!within_limits(block, lane, hit.t)) continue;
-            if (offer(block, lane, hit, query)) return true;
-        }
-        return false;
-    }
+    };
 
-    // Rounds x to float; the lanes in which a number within the error of x rounds otherwise.
-    [[gnu::always_inline]] static unsigned round(Double4 x, Double4 error, float (&rounded)[4]) {
-        const Float4 below = Float4::narrow(x - error), above = Float4::narrow(x + error);
-        (below + Float4::all(0.0f)).store(rounded);  // no -0
-        return ~equal(below, above);
+    // No hit beyond can be asked for.
+    template <class Query>
+    [[gnu::always_inline]] float farthest(const Query& query) const {
+        if constexpr (Query::in_order)
+            return query.best.t < ray_.given_tmax ? query.best.t : ray_.given_tmax;
+        else
+            return ray_.given_tmax;
     }
 
     // Rounding keeps order, so only where t rounds to a limit can it have crossed it.

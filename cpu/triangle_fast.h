@@ -3,6 +3,7 @@
 
 #include "frame.h"
 #include "layout.h"
+#include "query.h"
 
 namespace wive {
 
@@ -21,10 +22,16 @@ public:
         }
     }
 
-    // Offers every hit of the block to the query; true once the query is done.
-    template <class Corners, class Query>
-    [[gnu::always_inline]] bool test(const Corners& corners, Query& query) const {
-        Real4 e1[3], e2[3], p[3], s[3], q[3];
+    // The lanes of a block that are hit, and what solve() needs to say where.
+    struct Found {
+        unsigned lanes;
+        Real4 u, v, det, q[3];
+    };
+
+    template <class Corners>
+    [[gnu::always_inline]] Found find(const Corners& corners) const {
+        Found found;
+        Real4 e1[3], e2[3], p[3], s[3];
         for (unsigned axis = 0; axis < 3; ++axis) {
             const Real4 v0 = corners.vertex(0, axis);
             e1[axis] = corners.edge(1, axis, v0);
@@ -32,24 +39,31 @@ public:
             s[axis] = origin_[axis] - v0;
         }
         cross(direction_, e2, p);
-        cross(s, e1, q);
-        const Real4 det = dot(e1, p), size = abs(det), zero = Real4::all(0);
-        const Real4 u = flip_sign(dot(s, p), det), v = flip_sign(dot(direction_, q), det);
+        cross(s, e1, found.q);
+        found.det = dot(e1, p);
+        const Real4 size = abs(found.det), zero = Real4::all(0);
+        found.u = flip_sign(dot(s, p), found.det);
+        found.v = flip_sign(dot(direction_, found.q), found.det);
         // A determinant of zero (a ray in the triangle's plane) fails, and so does NaN (an unused lane): where u is
         // NaN and v is not, min gives v, but the sum is NaN.
-        unsigned lanes = all_in_order(zero, min(u, v), u + v, size, zero, size);
-        lanes = corners.used(lanes);
-        if (lanes == 0) [[likely]] return false;
+        found.lanes = corners.used(all_in_order(zero, min(found.u, found.v), found.u + found.v, size, zero, size));
+        return found;
+    }
+
+    // Offers the hits to the query; true once the query is done.
+    template <class Corners, class Query>
+    [[gnu::always_inline]] bool solve(const Corners& corners, const Found& found, Query& query) const {
         alignas(4 * sizeof(Real)) Real ts[4], us[4], vs[4];
-        for (Real4& component : q) component = component / size;  // first: the product of three lengths may overflow
-        flip_sign(dot(e2, q), det).store(ts);
-        (u / size).store(us);
-        (v / size).store(vs);
-        for (; lanes != 0; lanes &= lanes - 1) {
-            const int lane = __builtin_ctz(lanes);
-            if (query.offer(ts[lane], us[lane], vs[lane], static_cast<std::uint32_t>(corners.block.prim_at(lane)))) return true;
+        const Real4 size = abs(found.det);
+        Real4 e2[3], q[3];
+        for (unsigned axis = 0; axis < 3; ++axis) {
+            e2[axis] = corners.edge(2, axis, corners.vertex(0, axis));
+            q[axis] = found.q[axis] / size;  // first: the product of three lengths may overflow
         }
-        return false;
+        flip_sign(dot(e2, q), found.det).store(ts);
+        (found.u / size).store(us);
+        (found.v / size).store(vs);
+        return offer_lanes(corners.block, found.lanes, ts, us, vs, query);
     }
 
 private:

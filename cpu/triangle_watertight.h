@@ -12,6 +12,7 @@
 
 #include "frame.h"
 #include "layout.h"
+#include "query.h"
 #include "triangle_watertight_float64.h"
 
 namespace wive {
@@ -49,9 +50,19 @@ public:
         for (int k = 0; k < 3; ++k) origin_[k] = Real4::all(ray.origin[axis_[k]]);
     }
 
-    // Offers every hit of the block to the query; true once the query is done.
-    template <class Corners, class Query>
-    [[gnu::always_inline]] bool test(const Corners& corners, Query& query) const {
+    // The lanes of a block that may be hit, and what solve() needs to say where.
+    struct FoundFloats {
+        unsigned lanes, ties;  // ties: where rounding may have hidden a sign
+        Float4 side;           // negative where the edge functions are
+    };
+    struct FoundDoubles {
+        unsigned lanes;
+        Double4 x[3], y[3], z[3], weight[3];
+    };
+    using Found = std::conditional_t<precision_of<Real> == Precision::float64, FoundDoubles, FoundFloats>;
+
+    template <class Corners>
+    [[gnu::always_inline]] Found find(const Corners& corners) const {
         Real4 x[3], y[3], z[3];
         const Real4 shear_x = Real4::all(shear_[0]), shear_y = Real4::all(shear_[1]);
         for (unsigned k = 0; k < 3; ++k) {
@@ -62,37 +73,36 @@ public:
         const Real4 u = x[2] * y[1] - y[2] * x[1];
         const Real4 v = x[0] * y[2] - y[0] * x[2];
         const Real4 w = x[1] * y[0] - y[1] * x[0];
-        const Real4 low = min(min(u, v), w), high = max(max(u, v), w), zero = Real4::all(0);
-        unsigned lanes = corners.used(one_sided(low, high));
-        if (lanes == 0) [[likely]] return false;
-
-        if constexpr (sizeof(Real) == sizeof(double)) {
-            Solution64<Isa> hits;
-            const Real4 weight[3] = {u, v, w};
-            lanes = hits.solve(lanes, x, y, z, weight, ray_.direction[axis_[2]]);
-            return offer(corners, lanes, hits.t, hits.u, hits.v, query);
+        const Real4 low = min(min(u, v), w), high = max(max(u, v), w);
+        const unsigned lanes = corners.used(one_sided(low, high));
+        if constexpr (precision_of<Real> == Precision::float64) {
+            return {lanes, {x[0], x[1], x[2]}, {y[0], y[1], y[2]}, {z[0], z[1], z[2]}, {u, v, w}};
         } else {
-            Float4 side = low + zero;  // negative where the edge functions are; adding zero clears the sign of -0
-            if (const unsigned ties = lanes & (equal(u, zero) | equal(v, zero) | equal(w, zero)); ties != 0) [[unlikely]]
-                lanes = settle_ties(corners.block, lanes, ties, side);
+            const Float4 zero = Float4::all(0);
+            return {lanes, equal(low, zero) | equal(high, zero), low + zero};  // adding zero clears the sign of -0
+        }
+    }
 
+    // Offers the hits to the query; true once the query is done.
+    template <class Corners, class Query>
+    [[gnu::always_inline]] bool solve(const Corners& corners, const Found& found, Query& query) const {
+        if constexpr (precision_of<Real> == Precision::float64) {
+            Solution64<Isa> hits;
+            const unsigned lanes =
+                hits.solve(found.lanes, found.x, found.y, found.z, found.weight, ray_.direction[axis_[2]]);
+            return offer_lanes(corners.block, lanes, hits.t, hits.u, hits.v, query);
+        } else {
+            unsigned lanes = found.lanes;
+            Float4 side = found.side;
+            if (const unsigned ties = lanes & found.ties; ties != 0) [[unlikely]]
+                lanes = settle_ties(corners.block, lanes, ties, side);
             alignas(16) float ts[4], us[4], vs[4];
             intersect(corners, lanes, side, ts, us, vs);
-            return offer(corners, lanes, ts, us, vs, query);
+            return offer_lanes(corners.block, lanes, ts, us, vs, query);
         }
     }
 
 private:
-    template <class Corners, class Query>
-    [[gnu::always_inline]] static bool offer(const Corners& corners, unsigned lanes, const Real (&ts)[4], const Real (&us)[4],
-                                             const Real (&vs)[4], Query& query) {
-        for (; lanes != 0; lanes &= lanes - 1) {
-            const int lane = __builtin_ctz(lanes);
-            if (query.offer(ts[lane], us[lane], vs[lane], static_cast<std::uint32_t>(corners.block.prim_at(lane)))) return true;
-        }
-        return false;
-    }
-
     // t, u and v in double, rounded once. The plane across the ray is scaled by the direction's longest component,
     // which spares the divisions. Where only the rounding of the corners let the ray in, a weight is on the wrong side
     // here: there the rounded triangle is what is hit, and t lies where its boxes are looked for.
