@@ -96,16 +96,23 @@ private:
         ends.done += ready & end;
     }
 
+    // A few nodes are visited before their flights are sorted into queues: the one is without a branch, and what is guessed
+    // wrong in the other throws away little. Not all of them, though: prefetches must have something to hide behind.
     [[gnu::always_inline]] void visit_nodes() {
+        constexpr std::ptrdiff_t few = 8;
         const BvhView bvh = bvh_;
         State** const last = ends_.node;
         Ends ends = {at_node_, ends_.leaf, ends_.done};  // refilled from the front, never past the flight at hand
-        for (State** i = at_node_; i != last; ++i) {
-            State& f = **i;
-            Stack::Top top = f.top;
-            f.counters.inner_node();
-            visit<Query::in_order>(bvh.template node<Form>(top.child()), Slabs<Isa>(f.ray), f.query.interval.reach(), top);
-            wait(bvh, f, top, true, true, ends);
+        for (State** i = at_node_; i != last;) {
+            State** const next = last - i < few ? last : i + few;
+            for (State** j = i; j != next; ++j) {
+                State& f = **j;
+                Stack::Top top = f.top;
+                f.counters.inner_node();
+                visit<Query::in_order>(bvh.template node<Form>(top.child()), Slabs<Isa>(f.ray), f.query.interval.reach(), top);
+                f.top = top;
+            }
+            for (; i != next; ++i) wait(bvh, **i, (*i)->top, true, true, ends);
         }
         ends_ = ends;
     }

@@ -72,7 +72,8 @@ _SOLVE = (
     + """
     const Filter filter((const float*)units, at, stride, axes, origin, shear_x, shear_y);
     const double e = 1.1102230246251565e-16;
-    bool doubt = filter.low <= filter.error && -filter.error <= filter.high;
+    const bool on_edge = filter.low <= filter.error && -filter.error <= filter.high;  // maybe
+    bool doubt = on_edge;
     const double share = 1.0 / (filter.weight[0] + filter.weight[1] + filter.weight[2]);
     const double weight_error = 6.0 * filter.error * (share < 0.0 ? -share : share);
     double depth = 0.0;
@@ -87,6 +88,11 @@ _SOLVE = (
         const float below = (float)(values[i] - errors[i]), above = (float)(values[i] + errors[i]);
         doubt = doubt || !(below == above);
         hit[i] = below + 0.0f;
+        // Most doubts are about where a ray meets the surface that it leaves from, which does not matter.
+        if (i == 0 && !on_edge && (above < tmin || below > farthest)) {
+            hit[3] = 0.0f;
+            return hit;
+        }
     }
     hit[3] = 1.0f;
     if (!doubt) return hit;
@@ -154,9 +160,14 @@ def solve_exactly(
     shear_x: wp.float64,
     shear_y: wp.float64,
     inverse: wp.float64,
+    tmin: float,
+    farthest: float,
     crossings: bool,
 ) -> wp.vec4:
-    """t, u and v of a triangle, correctly rounded, and 1; a 0 last where the line misses it."""
+    """t, u and v of a triangle, correctly rounded, and 1; a 0 last where the line misses it.
+
+    Or where it certainly meets it outside [tmin, farthest]; what is in doubt there is not missed.
+    """
     ...
 
 

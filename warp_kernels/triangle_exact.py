@@ -115,8 +115,13 @@ def exact_triangles(lanes: SimpleNamespace, form: SimpleNamespace, kept: int) ->
 
     @without_gradient
     @wp.func(inline=False)
-    def solve(units: wp.uint64, block: int, j: int, stack: stack_argument, crossings: bool):
-        """t, u, v and 1; a 0 last where the ray misses the triangle or meets it outside its limits."""
+    def solve(
+        units: wp.uint64, block: int, j: int, stack: stack_argument, best_t: float, crossings: bool
+    ):
+        """t, u, v and 1; a 0 last where the ray misses the triangle or meets it outside its limits.
+
+        Also where it meets it beyond best_t, in the caller's units.
+        """
         at = vertices_of(units, block, j)
         stride = stride_of(units, block)
         origin = kept_vector(stack, 1)
@@ -131,6 +136,8 @@ def exact_triangles(lanes: SimpleNamespace, form: SimpleNamespace, kept: int) ->
             load_double(stack, kept + 10),
             load_double(stack, kept + 12),
             load_double(stack, kept + 14),
+            kept_number(stack, 7),
+            wp.min(best_t, kept_number(stack, 8)),
             crossings,
         )
         if hit[3] != 0.0 and not lies_within(
@@ -246,7 +253,10 @@ def make_exact_leaf_test(
                 left = left & (left - wp.uint32(1))
                 triangle = wp.where(length == 1, lane & 3, j)
                 prim = wp.cast(load_float(units, prim_at(units, block, triangle)), wp.int32)
-                hit = solve(units, block, triangle, stack, crossings)
+                best_t = float(wp.inf)  # noqa: UP018
+                if wp.static(compares):
+                    best_t = leaf.best.given_t
+                hit = solve(units, block, triangle, stack, best_t, crossings)
                 if hit[3] != 0.0:
                     if wp.static(compares):
                         leaf.best = take_closest(leaf.best, units, block + triangle, stack, hit, prim)
