@@ -115,8 +115,9 @@ struct AvxHits {
     WIVE_INLINE unsigned count() const {
         return static_cast<unsigned>(_mm_popcnt_u32(static_cast<unsigned>(_mm256_movemask_ps(v))));
     }
-    // The lowest lane, of at least one.
+    // The lowest and the highest lane, of at least one.
     WIVE_INLINE unsigned first() const { return _tzcnt_u32(static_cast<unsigned>(_mm256_movemask_ps(v))); }
+    WIVE_INLINE unsigned last() const { return 31 - _lzcnt_u32(static_cast<unsigned>(_mm256_movemask_ps(v))); }
 };
 
 // Those with a child: the hits of a node's lanes, without the empty ones.

@@ -116,6 +116,7 @@ struct ScalarHits {
     unsigned mask;
     WIVE_INLINE unsigned count() const { return static_cast<unsigned>(__builtin_popcount(mask)); }
     WIVE_INLINE unsigned first() const { return static_cast<unsigned>(__builtin_ctz(mask)); }
+    WIVE_INLINE unsigned last() const { return 31 - static_cast<unsigned>(__builtin_clz(mask)); }
 };
 WIVE_INLINE ScalarHits hits(const ScalarLanes<float, 8>& tnear, const ScalarLanes<float, 8>& tfar) {
     return {less_equal(tnear, tfar)};

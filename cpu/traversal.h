@@ -89,16 +89,20 @@ template <bool in_order, class Isa, template <class> class Slabs>
         prefetch<Form>(bvh, top.child(-2));
         return top.child();
     }
-    if (count == 1) {
-        prefetch<Form>(bvh, top.child(-1));
-        return node.child[hit.first()];
-    }
+    if constexpr (in_order)
+        if (count == 1) {
+            prefetch<Form>(bvh, top.child(-1));
+            return node.child[hit.first()];
+        }
     const typename Isa::template Lanes<in_order> lanes(order, hit, tnear, node.child);
     lanes.compress_to(top);
     top.move(static_cast<std::ptrdiff_t>(count) - 1);
     prefetch<Form>(bvh, top.child(-1));
     prefetch<Form>(bvh, top.child(-2));
-    return lanes.last_hit();
+    if constexpr (in_order)
+        return lanes.last_hit();
+    else
+        return node.child[hit.last()];
 }
 
 // What ray i asks, before anything is found. Only the query for every hit knows whose hits they are.
