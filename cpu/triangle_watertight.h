@@ -56,27 +56,18 @@ public:
         Float4 side;           // negative where the edge functions are
     };
     struct FoundDoubles {
-        unsigned lanes;
-        Double4 x[3], y[3], z[3], weight[3];
+        unsigned lanes;  // the rest is taken again, which costs less than to keep it for every block
     };
     using Found = std::conditional_t<precision_of<Real> == Precision::float64, FoundDoubles, FoundFloats>;
 
     template <class Corners>
     [[gnu::always_inline]] Found find(const Corners& corners) const {
-        Real4 x[3], y[3], z[3];
-        const Real4 shear_x = Real4::all(shear_[0]), shear_y = Real4::all(shear_[1]);
-        for (unsigned k = 0; k < 3; ++k) {
-            z[k] = corners.vertex(k, axis_[2]) - origin_[2];
-            x[k] = (corners.vertex(k, axis_[0]) - origin_[0]) - shear_x * z[k];
-            y[k] = (corners.vertex(k, axis_[1]) - origin_[1]) - shear_y * z[k];
-        }
-        const Real4 u = x[2] * y[1] - y[2] * x[1];
-        const Real4 v = x[0] * y[2] - y[0] * x[2];
-        const Real4 w = x[1] * y[0] - y[1] * x[0];
+        const Sheared<Corners> sheared(*this, corners);
+        const auto& [u, v, w] = sheared.weight;
         const Real4 low = min(min(u, v), w), high = max(max(u, v), w);
         const unsigned lanes = corners.used(one_sided(low, high));
         if constexpr (precision_of<Real> == Precision::float64) {
-            return {lanes, {x[0], x[1], x[2]}, {y[0], y[1], y[2]}, {z[0], z[1], z[2]}, {u, v, w}};
+            return {lanes};
         } else {
             const Float4 zero = Float4::all(0);
             return {lanes, equal(low, zero) | equal(high, zero), low + zero};  // adding zero clears the sign of -0
@@ -87,9 +78,10 @@ public:
     template <class Corners, class Query>
     [[gnu::always_inline]] bool solve(const Corners& corners, const Found& found, Query& query) const {
         if constexpr (precision_of<Real> == Precision::float64) {
+            const Sheared<Corners> sheared(*this, corners);
             Solution64<Isa> hits;
-            const unsigned lanes =
-                hits.solve(found.lanes, found.x, found.y, found.z, found.weight, ray_.direction[axis_[2]]);
+            const unsigned lanes = hits.solve(found.lanes, sheared.x, sheared.y, sheared.z, sheared.weight,
+                                              ray_.direction[axis_[2]]);
             return offer_lanes(corners.block, lanes, hits.t, hits.u, hits.v, query);
         } else {
             unsigned lanes = found.lanes;
@@ -103,6 +95,24 @@ public:
     }
 
 private:
+    // The corners where the ray is the z axis, and the edge functions.
+    template <class Corners>
+    struct Sheared {
+        Real4 x[3], y[3], z[3], weight[3];
+
+        [[gnu::always_inline]] Sheared(const WatertightTriangles& test, const Corners& corners) {
+            const Real4 shear_x = Real4::all(test.shear_[0]), shear_y = Real4::all(test.shear_[1]);
+            for (unsigned k = 0; k < 3; ++k) {
+                z[k] = corners.vertex(k, test.axis_[2]) - test.origin_[2];
+                x[k] = (corners.vertex(k, test.axis_[0]) - test.origin_[0]) - shear_x * z[k];
+                y[k] = (corners.vertex(k, test.axis_[1]) - test.origin_[1]) - shear_y * z[k];
+            }
+            weight[0] = x[2] * y[1] - y[2] * x[1];
+            weight[1] = x[0] * y[2] - y[0] * x[2];
+            weight[2] = x[1] * y[0] - y[1] * x[0];
+        }
+    };
+
     // t, u and v in double, rounded once. The plane across the ray is scaled by the direction's longest component,
     // which spares the divisions. Where only the rounding of the corners let the ray in, a weight is on the wrong side
     // here: there the rounded triangle is what is hit, and t lies where its boxes are looked for.
