@@ -253,7 +253,7 @@ def make_exact_leaf_test(
                 left = left & (left - wp.uint32(1))
                 triangle = wp.where(length == 1, lane & 3, j)
                 prim = wp.cast(load_float(units, prim_at(units, block, triangle)), wp.int32)
-                best_t = float(wp.inf)  # noqa: UP018
+                best_t = float(wp.inf)
                 if wp.static(compares):
                     best_t = leaf.best.given_t
                 hit = solve(units, block, triangle, stack, best_t, crossings)
