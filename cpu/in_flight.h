@@ -83,7 +83,8 @@ private:
 
     // The child on top is next, unless it may be hidden, which a leaf that was begun may not: prefetched now and, where
     // nothing is left to be done before, waited for in the right queue. Written to all three, and counted in one: no branch.
-    [[gnu::always_inline]] static void wait(const BvhView& bvh, State& f, Stack::Top top, bool may_hide, bool ready, Ends& ends) {
+    [[gnu::always_inline]] static void wait(const BvhView& bvh, State& f, bool may_hide, bool ready, Ends& ends) {
+        Stack::Top top = f.top;
         if constexpr (Query::in_order)
             while (may_hide & (top.distance() > f.query.interval.reach())) top.move(-1);
         f.top = top;
@@ -112,7 +113,7 @@ private:
                 visit<Query::in_order>(bvh.template node<Form>(top.child()), Slabs<Isa>(f.ray), f.query.interval.reach(), top);
                 f.top = top;
             }
-            for (; i != next; ++i) wait(bvh, **i, (*i)->top, true, true, ends);
+            for (; i != next; ++i) wait(bvh, **i, true, true, ends);
         }
         ends_ = ends;
     }
@@ -138,7 +139,8 @@ private:
             *end = {&f, &block, last_block, Triangles<Isa>(f.ray).find(Corners(block))};
             const bool found = end->found.lanes != 0;
             end += found;
-            wait(bvh, f, top, last_block, !found, ends);
+            f.top = top;
+            wait(bvh, f, last_block, !found, ends);
         }
         for (const Candidate* c = candidates_; c != end; ++c) {
             State& f = *c->flight;
@@ -148,8 +150,7 @@ private:
                 if (!c->last_block) f.counters.leaf();
             }
         }
-        for (const Candidate* c = candidates_; c != end; ++c)
-            wait(bvh, *c->flight, c->flight->top, c->last_block, true, ends);
+        for (const Candidate* c = candidates_; c != end; ++c) wait(bvh, *c->flight, c->last_block, true, ends);
         ends_ = ends;
     }
 

@@ -71,10 +71,11 @@ template <bool in_order, class Isa, template <class> class Slabs>
     top.move(static_cast<std::ptrdiff_t>(hit.count()) - 1);                                   // (D) store
 }
 
-// The same for one ray on its own, whose next step can't begin before the next child is known: two branches for what
-// need not wait for the permute and the stack. Nothing hit: predicted, the processor goes on with what lies below on
+// The same for one ray on its own, whose next step can't begin before the next child is known: branches for what need
+// not wait for the permute and the stack. Nothing hit: predicted, the processor goes on with what lies below on
 // the stack while this node's boxes are still being decided. One child hit: it is next, and the stack stays as it is.
-// 40 cycles a node without them, 21 with them, where rays are alike (docs/design.md).
+// 40 cycles a node without them, 21 with them, where rays are alike (docs/design.md). Without an order there is no permute to
+// wait for: the node itself has the child, one hit or several.
 // Children are prefetched when they come to lie one and two below the top: the top is needed at once anyway.
 template <bool in_order, class Isa, template <class> class Slabs>
 [[gnu::always_inline]] inline std::uint32_t visit_and_take(const BvhView& bvh,
