@@ -5,61 +5,45 @@
 
 namespace wive {
 
+// The distance to a plane is byte * (step * rdir) + (origin * rdir + bias).
+struct CompressedPlanes {
+    using Node = CompressedNode;
+    static constexpr unsigned order_bits = 3;
+    static constexpr bool boxes_are_nested = false;  // each is rounded by the steps of its own node
+
+    template <class Float8>
+    [[gnu::always_inline]] static Float8 distance(const Node& node, auto children, std::size_t row, unsigned axis, Float8 rdir,
+                                                  Float8 bias) {
+        const Float8 origin = Float8::all(node.origin[axis]), step = Float8::all(node.step[axis]);
+        return multiply_add(children(node.planes[0] + row), step * rdir, multiply_add(origin, rdir, bias));
+    }
+    template <class Entries>
+    [[gnu::always_inline]] static Entries of_children(const Node& node, Entries entries) {
+        return {entries.tnear, entries.hit.without(entries.hit.of_child(node.child, end_of_stack))};
+    }
+};
+
 // Two cache lines hold a node, three a block of either size wherever it begins. Blocks of doubles are not compressed.
 template <class Real>
 struct CompressedForm;
 
 template <>
-struct CompressedForm<double> : Float32Form<double> {
-    using Node = CompressedNode;
+struct CompressedForm<double> : CompressedPlanes {
+    using Block = TriangleBlockOf<double>;
+    template <class Isa>
+    using Corners = StoredCorners<Isa>;
+    static constexpr unsigned prefetched_lines = Float32Form<double>::prefetched_lines;
 };
 
 template <>
-struct CompressedForm<float> {
-    using Node = CompressedNode;
+struct CompressedForm<float> : CompressedPlanes {
     using Block = CompressedBlock;
     template <class Isa>
     using Corners = SharedCorners<Isa>;
     static constexpr unsigned prefetched_lines = 3;
 };
 
-// As FullSlabs; the distance to a plane is byte * (step * rdir) + (origin * rdir + bias).
 template <class Isa>
-struct CompressedSlabs {
-    using Form = CompressedForm<typename Isa::Real>;
-    using Float8 = typename Isa::Float8;
-
-    Float8 rdir[3], near_bias[3], far_bias[3], tmin;
-    std::size_t near_row[3], far_row[3];  // in planes, which are bytes, from the node's first
-    unsigned order_shift;
-
-    [[gnu::always_inline]] explicit CompressedSlabs(const RayFrame<Isa>& ray) : tmin(Float8::all(ray.interval.entry())) {
-        for (unsigned axis = 0; axis < 3; ++axis) {
-            rdir[axis] = Float8::all(ray.rdir[axis]);
-            near_bias[axis] = Float8::all(ray.near_bias[axis]);
-            far_bias[axis] = Float8::all(ray.far_bias[axis]);
-            near_row[axis] = ray.near_row[axis];
-            far_row[axis] = ray.far_row[axis];
-        }
-        order_shift = ray.order_shift * 3 / 4;  // three bits a sequence
-    }
-
-    [[gnu::always_inline]] typename Isa::Order order(const CompressedNode& node) const { return {node.order, order_shift}; }
-
-    [[gnu::always_inline]] Entries<Isa> test(const CompressedNode& node, float tmax) const {
-        const std::uint8_t* planes = node.planes[0];
-        Float8 near_plane[3], far_plane[3];
-        for (unsigned axis = 0; axis < 3; ++axis) {
-            const Float8 origin = Float8::all(node.origin[axis]), step = Float8::all(node.step[axis]) * rdir[axis];
-            near_plane[axis] = multiply_add(Float8::load(planes + near_row[axis]), step,
-                                            multiply_add(origin, rdir[axis], near_bias[axis]));
-            far_plane[axis] = multiply_add(Float8::load(planes + far_row[axis]), step,
-                                           multiply_add(origin, rdir[axis], far_bias[axis]));
-        }
-        const Float8 tnear = max(max(near_plane[0], near_plane[1]), max(near_plane[2], tmin));
-        const Float8 tfar = min(min(far_plane[0], far_plane[1]), min(far_plane[2], Float8::all(tmax)));
-        return {tnear, with_child(hits(tnear, tfar), node.child)};
-    }
-};
+using CompressedSlabs = RaySlabs<Isa, CompressedForm<typename Isa::Real>>;
 
 }  // namespace wive

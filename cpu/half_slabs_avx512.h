@@ -13,6 +13,7 @@ namespace wive {
 template <class Isa>
 struct HalfSlabs {
     using Form = Float32Form<float>;
+    using Node = wive::Node;
 
     __m512 rdir[3], bias[3];
     __m512 tmin_and_tmax;
@@ -34,8 +35,8 @@ struct HalfSlabs {
     WIVE_INLINE Entries<Isa> test(const Node& node, float tmax) const {
         const auto planes = [&](unsigned axis) {
             const __m512 near_far =
-                _mm512_insertf32x8(_mm512_castps256_ps512(_mm256_load_ps(row(node, near_row[axis]))),
-                                   _mm256_load_ps(row(node, far_row[axis])), 1);
+                _mm512_insertf32x8(_mm512_castps256_ps512(_mm256_load_ps(planes_from(node, near_row[axis]))),
+                                   _mm256_load_ps(planes_from(node, far_row[axis])), 1);
             return _mm512_fmadd_ps(near_far, rdir[axis], bias[axis]);
         };
         const __m512 interval = _mm512_mask_broadcastss_ps(tmin_and_tmax, 0xff00, _mm_set_ss(-tmax));

@@ -2,11 +2,13 @@
 //
 // One ray's next node is known only when its last is done, and then it may have to come from memory. Here the others
 // take their turns meanwhile: a ray's next node or leaf is prefetched when it becomes known and visited a round later.
-// Hits are those of the single ray, bit for bit: nothing passes between rays.
+// Hits are those of the single ray, bit for bit: nothing passes between rays. Rays that go together need no turns: packet.h.
 #pragma once
 
 #include <new>
+#include <type_traits>
 
+#include "packet.h"
 #include "traversal.h"
 
 namespace wive {
@@ -26,14 +28,24 @@ class InFlight {
     using Rays = RayBatch<typename Isa::Real>;
     using Hits = HitBatch<typename Isa::Real>;
 
+    using Together = Packets<Isa, Slabs, Triangles, Query>;
+
 public:
+    // Kernels that count do so for each ray alone.
+    using OwnPackets = std::conditional_t<std::is_same_v<Counters, NoCounters> && Together::hits_are_those_of_rays_alone,
+                                          Together, NoPackets>;
     using State = Flight<typename Triangles<Isa>::Frame, Query, Counters>;
     using Form = typename Slabs<Isa>::Form;
     using Corners = typename Form::template Corners<Isa>;
 
-    [[gnu::always_inline]] InFlight(const BvhView& bvh, const Rays& rays, const Hits& hits,
-                                    const RaySource& source, std::byte* scratch)
-        : bvh_(bvh), rays_(rays), hits_(hits), source_(source), flights_(reinterpret_cast<State*>(scratch)) {}
+    [[gnu::always_inline]] InFlight(const BvhView& bvh, const Rays& rays, const Hits& hits, const RaySource& source,
+                                    OwnPackets& packets, std::byte* scratch)
+        : bvh_(bvh),
+          rays_(rays),
+          hits_(hits),
+          source_(source),
+          packets_(packets),
+          flights_(reinterpret_cast<State*>(scratch)) {}
 
     void trace(unsigned in_flight) {
         for (unsigned i = 0; i < in_flight; ++i) {
@@ -64,10 +76,12 @@ private:
     // Puts the next ray that can hit anything into a flight's place; rays that can't are answered here.
     void start(State& f) {
         for (;; ++next_) {
-            if (next_ == end_ && !source_.take(next_, end_)) {
-                end_ = next_;
-                return;
-            }
+            do {
+                if (next_ == end_ && !source_.take(next_, end_)) {
+                    end_ = next_;
+                    return;
+                }
+            } while (packets_.answer(next_, end_));
             new (&f.query) Query{};  // in place: a temporary copied over would stall on its own stores
             f.counters = Counters{};
             if (f.ray.load(bvh_, rays_, next_)) break;
@@ -110,7 +124,7 @@ private:
                 State& f = **j;
                 Stack::Top top = f.top;
                 f.counters.inner_node();
-                visit<Query::in_order>(bvh.template node<Form>(top.child()), Slabs<Isa>(f.ray), f.query.interval.reach(), top);
+                visit<Query::in_order, Isa>(bvh.template node<Form>(top.child()), Slabs<Isa>(f.ray), f.query.interval.reach(), top);
                 f.top = top;
             }
             for (; i != next; ++i) wait(bvh, **i, true, true, ends);
@@ -169,6 +183,7 @@ private:
     const Rays rays_;
     const Hits hits_;
     const RaySource source_;
+    OwnPackets& packets_;
     State* flights_;
     State *at_node_[max_in_flight + 1], *at_leaf_[max_in_flight + 1], *done_[max_in_flight + 1];
     Candidate candidates_[max_in_flight + 1];
@@ -180,10 +195,13 @@ template <class Isa, template <class> class Slabs, template <class> class Triang
 void trace_batch(const BvhView& bvh, const RayBatch<typename Isa::Real>& rays,
                  const HitBatch<typename Isa::Real>& hits, const RaySource& source, unsigned in_flight,
                  std::byte* scratch) {
-    if (in_flight <= 1)
+    if (in_flight <= 1) {
         trace_one_by_one<Isa, Slabs, Triangles, Query, Counters>(bvh, rays, hits, source);
-    else
-        InFlight<Isa, Slabs, Triangles, typename Query::InFlight, Counters>(bvh, rays, hits, source, scratch).trace(in_flight);
+    } else {
+        using Flights = InFlight<Isa, Slabs, Triangles, typename Query::InFlight, Counters>;
+        typename Flights::OwnPackets packets(bvh, rays, hits, in_flight);
+        Flights(bvh, rays, hits, source, packets, scratch).trace(in_flight);
+    }
 }
 
 }  // namespace wive

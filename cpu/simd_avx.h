@@ -112,20 +112,19 @@ WIVE_INLINE AvxDouble4 AvxDouble4::of(SseFloat4 a) { return widen(a); }
 // Which of eight lanes were hit, as a vector of all-ones and all-zeros.
 struct AvxHits {
     __m256 v;
-    WIVE_INLINE unsigned count() const {
-        return static_cast<unsigned>(_mm_popcnt_u32(static_cast<unsigned>(_mm256_movemask_ps(v))));
-    }
+    // Lane 0 lowest.
+    WIVE_INLINE unsigned bits() const { return static_cast<unsigned>(_mm256_movemask_ps(v)); }
+    WIVE_INLINE unsigned count() const { return static_cast<unsigned>(_mm_popcnt_u32(bits())); }
     // The lowest and the highest lane, of at least one.
-    WIVE_INLINE unsigned first() const { return _tzcnt_u32(static_cast<unsigned>(_mm256_movemask_ps(v))); }
-    WIVE_INLINE unsigned last() const { return 31 - _lzcnt_u32(static_cast<unsigned>(_mm256_movemask_ps(v))); }
+    WIVE_INLINE unsigned first() const { return _tzcnt_u32(bits()); }
+    WIVE_INLINE unsigned last() const { return 31 - _lzcnt_u32(bits()); }
+    // The lanes of a node that hold this child; of all lanes if it is end_of_stack, the empty ones.
+    WIVE_INLINE static AvxHits of_child(const std::uint32_t* row, std::uint32_t child) {
+        const __m256i children = _mm256_load_si256(reinterpret_cast<const __m256i*>(row));
+        return {_mm256_castsi256_ps(_mm256_cmpeq_epi32(children, _mm256_set1_epi32(static_cast<int>(child))))};
+    }
+    WIVE_INLINE AvxHits without(AvxHits others) const { return {_mm256_andnot_ps(others.v, v)}; }
 };
-
-// Those with a child: the hits of a node's lanes, without the empty ones.
-WIVE_INLINE AvxHits with_child(AvxHits hits, const std::uint32_t* child) {
-    const __m256i children = _mm256_load_si256(reinterpret_cast<const __m256i*>(child));
-    const __m256i empty = _mm256_cmpeq_epi32(children, _mm256_set1_epi32(static_cast<int>(end_of_stack)));
-    return {_mm256_andnot_ps(_mm256_castsi256_ps(empty), hits.v)};
-}
 
 struct AvxFloat8 {
     __m256 v;
@@ -141,6 +140,9 @@ struct AvxFloat8 {
     }
     WIVE_INLINE friend AvxFloat8 min(AvxFloat8 a, AvxFloat8 b) { return {_mm256_min_ps(a.v, b.v)}; }
     WIVE_INLINE friend AvxFloat8 max(AvxFloat8 a, AvxFloat8 b) { return {_mm256_max_ps(a.v, b.v)}; }
+    WIVE_INLINE friend float highest_lane(AvxFloat8 a) {
+        return highest_lane(SseFloat4{_mm_max_ps(_mm256_castps256_ps128(a.v), _mm256_extractf128_ps(a.v, 1))});
+    }
     WIVE_INLINE friend AvxHits hits(AvxFloat8 tnear, AvxFloat8 tfar) {
         return {_mm256_cmp_ps(tnear.v, tfar.v, _CMP_LE_OQ)};
     }

@@ -111,20 +111,22 @@ struct ScalarLanes {
     }
 };
 
-// Which of eight lanes were hit.
+// Which of eight lanes were hit. As AvxHits.
 struct ScalarHits {
     unsigned mask;
+    WIVE_INLINE unsigned bits() const { return mask; }
     WIVE_INLINE unsigned count() const { return static_cast<unsigned>(__builtin_popcount(mask)); }
     WIVE_INLINE unsigned first() const { return static_cast<unsigned>(__builtin_ctz(mask)); }
     WIVE_INLINE unsigned last() const { return 31 - static_cast<unsigned>(__builtin_clz(mask)); }
+    WIVE_INLINE static ScalarHits of_child(const std::uint32_t* row, std::uint32_t child) {
+        unsigned lanes = 0;
+        for (int i = 0; i < node_width; ++i) lanes |= static_cast<unsigned>(row[i] == child) << i;
+        return {lanes};
+    }
+    WIVE_INLINE ScalarHits without(ScalarHits others) const { return {mask & ~others.mask}; }
 };
 WIVE_INLINE ScalarHits hits(const ScalarLanes<float, 8>& tnear, const ScalarLanes<float, 8>& tfar) {
     return {less_equal(tnear, tfar)};
-}
-WIVE_INLINE ScalarHits with_child(ScalarHits hits, const std::uint32_t* child) {
-    unsigned used = 0;
-    for (int i = 0; i < node_width; ++i) used |= static_cast<unsigned>(child[i] != end_of_stack) << i;
-    return {hits.mask & used};
 }
 
 struct Scalar {

@@ -61,9 +61,8 @@ template <class Corners, class Triangles, class Query, class Counters>
 
 // Visits an inner node: the children that the ray meets go onto the stack, and top moves to the last of them, the
 // nearest; or to the entry below, where none was met. No branch: the same steps for no hit and for eight.
-template <bool in_order, class Isa, template <class> class Slabs>
-[[gnu::always_inline]] inline void visit(const typename Slabs<Isa>::Form::Node& node, const Slabs<Isa>& slabs, float tmax,
-                                         Stack::Top& top) {
+template <bool in_order, class Isa, class Slabs>
+[[gnu::always_inline]] inline void visit(const typename Slabs::Node& node, const Slabs& slabs, float tmax, Stack::Top& top) {
     const auto order = slabs.order(node);                                                     // (A) order
     const auto [tnear, hit] = slabs.test(node, tmax);                                         // (B) slabs
     const typename Isa::template Lanes<in_order> lanes(order, hit, tnear, node.child);        // (C) permute,
@@ -77,11 +76,10 @@ template <bool in_order, class Isa, template <class> class Slabs>
 // 40 cycles a node without them, 21 with them, where rays are alike (docs/design.md). Without an order there is no permute to
 // wait for: the node itself has the child, one hit or several.
 // Children are prefetched when they come to lie one and two below the top: the top is needed at once anyway.
-template <bool in_order, class Isa, template <class> class Slabs>
-[[gnu::always_inline]] inline std::uint32_t visit_and_take(const BvhView& bvh,
-                                                           const typename Slabs<Isa>::Form::Node& node,
-                                                           const Slabs<Isa>& slabs, float tmax, Stack::Top& top) {
-    using Form = typename Slabs<Isa>::Form;
+template <bool in_order, class Isa, class Slabs>
+[[gnu::always_inline]] inline std::uint32_t visit_and_take(const BvhView& bvh, const typename Slabs::Node& node,
+                                                           const Slabs& slabs, float tmax, Stack::Top& top) {
+    using Form = typename Slabs::Form;
     const auto order = slabs.order(node);
     const auto [tnear, hit] = slabs.test(node, tmax);
     const unsigned count = hit.count();
@@ -115,43 +113,53 @@ template <class Query, class Isa>
         return {ray.interval};
 }
 
-// Comes with what is asked in `result` and leaves the answer there; meanwhile it is in registers.
-template <class Isa, template <class> class Slabs, template <class> class Triangles, class Query, class Counters>
-[[gnu::noinline]] void traverse(const BvhView& bvh, const typename Triangles<Isa>::Frame& ray, Query& result,
-                                Counters& counters) {
-    using Form = typename Slabs<Isa>::Form;
-    using Corners = typename Form::template Corners<Isa>;
-    const Slabs<Isa> slabs(ray);
-    Query query = result;
-    Stack stack;
+// From the root down, for one ray or for several that go together. reach(): how far hits still count.
+// at_node(child, top): called before an inner node is visited. at_leaf(child, top): true once nothing more is asked.
+template <bool in_order, class Isa, class Slabs>
+[[gnu::always_inline]] inline void walk(const BvhView& bvh, const Slabs& slabs, Stack& stack, const auto& reach,
+                                        const auto& at_node, const auto& at_leaf) {
+    using Form = typename Slabs::Form;
     Stack::Top top(stack);
     std::uint32_t child = inner_child(0);  // the root
-    if constexpr (Query::in_order) top.distance() = -std::numeric_limits<float>::infinity();  // looked at where one child is hit
+    if constexpr (in_order) top.distance() = -std::numeric_limits<float>::infinity();  // looked at where one child is hit
     const auto take_next = [&] {
         top.move(-1);
         child = top.child();
     };
     // Children that have come to lie behind the best hit are passed over.
     const auto skip_hidden = [&] {
-        if constexpr (Query::in_order)
-            while (top.distance() > query.interval.reach()) take_next();
+        if constexpr (in_order)
+            while (top.distance() > reach()) take_next();
     };
     for (;;) {
         while (is_inner(child)) {
-            counters.inner_node();
-            child = visit_and_take<Query::in_order>(bvh, bvh.template node<Form>(child), slabs, query.interval.reach(), top);
+            at_node(child, top);
+            child = visit_and_take<in_order, Isa>(bvh, bvh.template node<Form>(child), slabs, reach(), top);
             skip_hidden();
         }
-        if (child == end_of_stack) break;
-        counters.leaf();
-        // Made here, not before the loop: registers are for what nodes need.
-        const Triangles<Isa> triangles(ray);
-        const auto* blocks = bvh.template leaf<Form>(child);
-        if (test_leaf<Corners>(blocks, leaf_block_count(child), triangles, query, counters)) break;
+        if (child == end_of_stack || at_leaf(child, top)) return;
         take_next();
         skip_hidden();
         prefetch<Form>(bvh, top.child(-2));
     }
+}
+
+// Comes with what is asked in `result` and leaves the answer there; meanwhile it is in registers.
+template <class Isa, template <class> class Slabs, template <class> class Triangles, class Query, class Counters>
+[[gnu::noinline]] void traverse(const BvhView& bvh, const typename Triangles<Isa>::Frame& ray, Query& result,
+                                Counters& counters) {
+    using Form = typename Slabs<Isa>::Form;
+    using Corners = typename Form::template Corners<Isa>;
+    Query query = result;
+    Stack stack;
+    walk<Query::in_order, Isa>(
+        bvh, Slabs<Isa>(ray), stack, [&] { return query.interval.reach(); },
+        [&](std::uint32_t, const Stack::Top&) { counters.inner_node(); },
+        [&](std::uint32_t child, const Stack::Top&) {
+            counters.leaf();
+            const Triangles<Isa> triangles(ray);  // made here: registers are for what nodes need
+            return test_leaf<Corners>(bvh.template leaf<Form>(child), leaf_block_count(child), triangles, query, counters);
+        });
     result = query;
 }
 

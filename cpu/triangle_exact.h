@@ -61,6 +61,7 @@ class ExactTriangles {
 
 public:
     using Frame = ExactFrame<Isa>;
+    static constexpr bool hits_are_in_boxes = true;  // made larger by the slack of frame.h
 
     [[gnu::always_inline]] explicit ExactTriangles(const Frame& ray) : ray_(ray) {}
 

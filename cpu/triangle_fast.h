@@ -14,6 +14,7 @@ class FastTriangles {
 
 public:
     using Frame = RayFrame<Isa>;
+    static constexpr bool hits_are_in_boxes = false;  // where a triangle is seen edge-on, t may lie anywhere
 
     [[gnu::always_inline]] explicit FastTriangles(const RayFrame<Isa>& ray) {
         for (int axis = 0; axis < 3; ++axis) {

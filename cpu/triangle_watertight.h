@@ -43,6 +43,7 @@ class WatertightTriangles {
 
 public:
     using Frame = WatertightFrame<Isa>;
+    static constexpr bool hits_are_in_boxes = true;  // made larger by the slack of frame.h
 
     [[gnu::always_inline]] explicit WatertightTriangles(const Frame& ray) : ray_(ray) {
         for (int k = 0; k < 3; ++k) axis_[k] = ray.axis[k];
