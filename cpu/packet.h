@@ -6,10 +6,8 @@
 // comes to the leaves that it comes to alone, in the same order, and its hits are the same bits.
 #pragma once
 
-#include <algorithm>
 #include <cstddef>
 #include <cstdint>
-#include <cstring>
 #include <limits>
 #include <new>
 
@@ -62,7 +60,7 @@ private:
         typename Triangles<Isa>::Found found;
     };
 
-    // Of every step-th ray. False where a direction or an origin is no number.
+    // Of every step-th ray. What is no number is left to load().
     bool go_together(std::size_t first, unsigned step) const {
         const auto vector = [](const Real* p, std::size_t i) { return Real4::set(p[3 * i], p[3 * i + 1], p[3 * i + 2], 0); };
         Real4 low_origin = vector(rays_.origins, first), high_origin = low_origin;
@@ -101,7 +99,7 @@ private:
             }
             tmin_[i] = ray.interval.entry();
             reach_[i] = ray.interval.reach();
-            bounds_.tmin = std::min(bounds_.tmin, tmin_[i]);
+            bounds_.tmin = tmin_[i] < bounds_.tmin ? tmin_[i] : bounds_.tmin;
             new (&query_[i]) Query(query_of<Query>(ray, hits_, first + i));
         }
         set_bounds(low_rdir, high_rdir, low_origin, high_origin, Float4::load(bvh_.extent));
@@ -135,7 +133,9 @@ private:
         const auto place = [&](const Stack::Top& top) { return parents_ + (&top.distance() - stack_.distances); };
         walk<Query::in_order, Isa>(
             bvh_, PacketSlabs<Isa, Form>(bounds_), stack_, [&] { return reach; },
-            [&](std::uint32_t child, const Stack::Top& top) { std::fill_n(place(top), node_width, child); },
+            [&](std::uint32_t child, const Stack::Top& top) {
+                for (int i = 0; i < node_width; ++i) place(top)[i] = child;
+            },
             [&](std::uint32_t child, const Stack::Top& top) {
                 const Node& parent = bvh_.template node<Form>(*place(top));
                 unsigned rays = rays_at(parent, Isa::Hits::of_child(parent.child, child).first());
@@ -229,20 +229,20 @@ public:
             pause_ = 0;
         } else {
             next_try_ = next + pause_;
-            pause_ = std::min<std::size_t>(2 * pause_ + Together::width, longest_pause);
+            pause_ = pause_ < longest_pause ? 2 * pause_ + Together::width : longest_pause;
         }
         return answered;
     }
 
 private:
-    static constexpr std::size_t longest_pause = 512;
+    static constexpr std::size_t longest_pause = 496;  // 16, 48, 112, 240, 496
 
     std::size_t next_try_, pause_ = 0;  // in rays
     Together packet_;
 };
 
 struct NoPackets {
-    NoPackets(const BvhView&, const auto&, const auto&, unsigned) {}
+    [[gnu::always_inline]] NoPackets(const BvhView&, const auto&, const auto&, unsigned) {}
     [[gnu::always_inline]] static bool answer(std::size_t, std::size_t) { return false; }
 };
 

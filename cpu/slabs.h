@@ -37,7 +37,7 @@ struct Float32Form {
     template <class Isa>
     using Corners = StoredCorners<Isa>;
     static constexpr unsigned prefetched_lines = sizeof(Real) == sizeof(float) ? 4 : 5;
-    static constexpr unsigned order_bits = 4;     // a sequence
+    static constexpr unsigned order_bits = 4;       // a sequence
     static constexpr bool boxes_are_nested = true;  // each in its parent's
 
     // Along a ray to the planes that stand in this row: plane * rdir + bias.
@@ -53,7 +53,7 @@ struct Float32Form {
 
 // A frame counts in four bits a sequence.
 template <class Form>
-constexpr unsigned order_shift_of(unsigned shift) { return shift * Form::order_bits / 4; }
+[[gnu::always_inline]] constexpr unsigned order_shift_of(unsigned shift) { return shift * Form::order_bits / 4; }
 
 // Entry and exit distances, cut to [tmin, tmax]; a child is hit where entry <= exit. Near and far say where an axis' planes
 // are met, of a node's children or, for as many rays, of one child.
