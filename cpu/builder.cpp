@@ -32,7 +32,7 @@ Bvh::Bvh(const Mesh<Real>& mesh, const BuildOptions& options)
     if (doubles && accuracy_ == Accuracy::exact)
         throw std::invalid_argument("accuracy: 'exact' takes vertices in float32, got float64; round them, or use 'watertight'");
     check_mesh(mesh, threads);
-    if constexpr (doubles) set_center(find_bounds(mesh, threads));
+    if constexpr (doubles) set_bounds(find_bounds(mesh, threads));
     const auto plant = [&] {
         return build_binary_tree(make_prim_refs(mesh, center_, threads), threads, options.depth_limit,
                                  largest_leaf(precision_, form_));
@@ -40,11 +40,7 @@ Bvh::Bvh(const Mesh<Real>& mesh, const BuildOptions& options)
     BinaryTree tree = plant();
     if (options.quality == Quality::high) optimize_by_reinsertion(tree, threads);
     triangle_count_ = tree.count;
-    if constexpr (doubles)
-        set_extent(tree.box);
-    else
-        set_bounds(tree.box);
-    const Point still_to_center = doubles ? Point{} : center_;
+    const Point still_to_center = settle(tree.box);
     EmittedTree emitted = emit_tree(tree, mesh, options, still_to_center, threads);
     if (emitted.depth > options.depth_limit) {  // reinsertion knows no limit, binning does
         tree = plant();
@@ -58,26 +54,9 @@ Bvh::Bvh(const Mesh<Real>& mesh, const BuildOptions& options)
 template Bvh::Bvh(const Mesh<float>&, const BuildOptions&);
 template Bvh::Bvh(const Mesh<double>&, const BuildOptions&);
 
-void Bvh::set_bounds(const Box& box) {
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-        bounds_[0][axis] = box.lo[axis];
-        bounds_[1][axis] = box.hi[axis];
-    }
-    if (box.lo[0] <= box.hi[0]) {
-        // Far from the origin, planes relative to the middle keep the boxes' slack small. Near it, the planes
-        // are left as they are, and so stay exact.
-        const Float4v middle = box.lo * 0.5f + box.hi * 0.5f;
-        const Float4v half = box.hi * 0.5f - box.lo * 0.5f;
-        const float size = std::max({half[0], half[1], half[2]});
-        for (std::size_t axis = 0; axis < 3; ++axis) {
-            center_[axis] = std::abs(middle[axis]) > 4 * size ? middle[axis] : 0.0f;
-            extent_[axis] = std::max(plane_above(box.hi[axis], center_[axis]), -plane_below(box.lo[axis], center_[axis]));
-        }
-    }
-}
-
-// The same for float64, where boxes need the centre first and the extent comes from them.
-void Bvh::set_center(const Bounds& bounds) {
+// Far from the origin, planes relative to the middle keep the boxes' slack small. Near it, they are left as they are, and so
+// stay exact.
+void Bvh::set_bounds(const Bounds& bounds) {
     bounds_ = bounds;
     const auto& [low, high] = bounds_;
     if (!(low[0] <= high[0])) return;
@@ -88,9 +67,20 @@ void Bvh::set_center(const Bounds& bounds) {
     }
 }
 
-void Bvh::set_extent(const Box& box) {
-    if (!(box.lo[0] <= box.hi[0])) return;
-    for (std::size_t axis = 0; axis < 3; ++axis) extent_[axis] = std::max(box.hi[axis], -box.lo[axis]);
+// What follows from the box of all triangles. Float32 trees learn their bounds from it; float64 trees had to know them before,
+// and their boxes are relative to the centre already. Returns what boxes are still to be taken relative to.
+Point Bvh::settle(const Box& all) {
+    Point still_to_center{};
+    if (precision_ == Precision::float32) {
+        set_bounds({{{all.lo[0], all.lo[1], all.lo[2]}, {all.hi[0], all.hi[1], all.hi[2]}}});
+        still_to_center = center_;
+    }
+    if (all.lo[0] <= all.hi[0])
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+            const float center = still_to_center[axis];
+            extent_[axis] = std::max(plane_above(all.hi[axis], center), -plane_below(all.lo[axis], center));
+        }
+    return still_to_center;
 }
 
 BvhView Bvh::view() const {

@@ -59,9 +59,8 @@ public:
 
 private:
     Bvh() = default;
-    void set_bounds(const Box& box);
-    void set_center(const Bounds& bounds);
-    void set_extent(const Box& box);
+    void set_bounds(const Bounds& bounds);
+    Point settle(const Box& all);
     template <class StoredNode>
     Sah sah_of(double root) const;
 

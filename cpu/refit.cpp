@@ -140,16 +140,11 @@ std::unique_ptr<Bvh> Bvh::refitted(const Mesh<Real>& mesh, unsigned asked_thread
     bvh->precision_ = precision_;
     bvh->depth_ = depth_;
     const BvhView from = view();
-    constexpr bool doubles = precision_of<Real> == Precision::float64;
-    if constexpr (doubles) bvh->set_center(find_bounds(mesh, threads));
+    if constexpr (precision_of<Real> == Precision::float64) bvh->set_bounds(find_bounds(mesh, threads));
     BoxFitter<Real> fitter(from, node_count_, bvh->units_.data(), mesh, bvh->center_, accuracy_);
     fitter.fit(threads);
     bvh->triangle_count_ = fitter.triangle_count();
-    if constexpr (doubles)
-        bvh->set_extent(fitter.all());
-    else
-        bvh->set_bounds(fitter.all());
-    const Point still_to_center = doubles ? Point{} : bvh->center_;
+    const Point still_to_center = bvh->settle(fitter.all());
     const Node* old_nodes = reinterpret_cast<const Node*>(units_.data());
     Node* to = reinterpret_cast<Node*>(bvh->units_.data());
     parallel_chunks(node_count_, chunk_size, threads, [&](std::size_t begin, std::size_t end) {
