@@ -28,7 +28,7 @@ def main() -> int:
         print("usage: python -m bench NAME [--help | options]\n")
         print("\n".join(f"  {known:8} {what}" for known, what in BENCHES.items()))
         return 0 if name in ("-h", "--help") else 2
-    from bench.compiled_shim import BenchError
+    from bench.contenders.compiled_shim import BenchError
 
     try:
         importlib.import_module(f"bench.{name}").main(options)

@@ -13,13 +13,13 @@ from collections.abc import Sequence
 
 import matplotlib
 
-from bench import report
-from bench.build_race import build_rows, tree_row
-from bench.features import QUALITIES, qualities
-from bench.native_embree import Isa
-from bench.options import listed, numbers, scene_parser
-from bench.scenes import TERRAIN, SceneFolder
-from bench.timing import Effort, core_count
+from bench.contenders.build_race import build_rows, tree_row
+from bench.contenders.native_embree import Isa
+from bench.support import report
+from bench.support.features import QUALITIES, qualities
+from bench.support.options import listed, numbers, scene_parser
+from bench.support.scenes import TERRAIN, SceneFolder
+from bench.support.timing import Effort, core_count
 from wive import _cpu
 
 matplotlib.use("Agg")

@@ -12,16 +12,16 @@ import sys
 from collections.abc import Sequence
 from itertools import product
 
-from bench import report
-from bench.build_race import build_rows, tree_row
-from bench.compiled_shim import BenchError
-from bench.embree_figure import draw
-from bench.embree_race import TUNED, Contender, speed_rows
-from bench.features import NODES, node_forms
-from bench.options import in_flights, listed, scene_parser
-from bench.rays import KINDS, recorded_rays
-from bench.scenes import SceneFolder
-from bench.timing import QUICK, Effort, geometric_mean
+from bench.contenders.build_race import build_rows, tree_row
+from bench.contenders.compiled_shim import BenchError
+from bench.contenders.embree_race import TUNED, Contender, speed_rows
+from bench.figures.embree_figure import draw
+from bench.support import report
+from bench.support.features import NODES, node_forms
+from bench.support.options import in_flights, listed, scene_parser
+from bench.support.rays import KINDS, recorded_rays
+from bench.support.scenes import SceneFolder
+from bench.support.timing import QUICK, Effort, geometric_mean
 from wive import _cpu
 
 ACCURACIES = ("fast", "watertight")

@@ -16,13 +16,13 @@ from pathlib import Path
 import matplotlib
 import numpy as np
 
-from bench import report
-from bench.compiled_shim import BenchError, compiled
-from bench.features import Accuracy, build_tree
-from bench.options import listed, numbers, scene_parser
-from bench.rays import KINDS, Rays, recorded_rays
-from bench.scenes import Mesh, SceneFolder
-from bench.timing import Effort, compare_in_turn, one_core, timed
+from bench.contenders.compiled_shim import BenchError, compiled
+from bench.support import report
+from bench.support.features import Accuracy, build_tree
+from bench.support.options import listed, numbers, scene_parser
+from bench.support.rays import KINDS, Rays, recorded_rays
+from bench.support.scenes import Mesh, SceneFolder
+from bench.support.timing import Effort, compare_in_turn, one_core, timed
 from wive import _cpu
 
 matplotlib.use("Agg")
@@ -84,7 +84,7 @@ def best_kernel() -> str:
 
 def memory_latency(size: int, loads: int) -> float:
     """Seconds that a dependent load takes from an array of `size` bytes."""
-    library = ctypes.CDLL(str(compiled(Path(__file__).with_name("memory_latency.cpp"))))
+    library = ctypes.CDLL(str(compiled(Path(__file__).parent / "native" / "memory_latency.cpp")))
     library.memory_latency.restype = ctypes.c_double
     library.memory_latency.argtypes = [ctypes.c_size_t, ctypes.c_size_t]
     with one_core():

@@ -14,14 +14,14 @@ from contextlib import nullcontext
 
 import numpy as np
 
-from bench import report
-from bench.compiled_shim import BenchError
-from bench.latency_contenders import Call, Contender, LaneForm, contenders
-from bench.latency_figure import draw
-from bench.options import listed, scene_parser
-from bench.rays import KINDS, Rays, recorded_rays
-from bench.scenes import SceneFolder
-from bench.timing import QUICK, Effort, one_core
+from bench.contenders.compiled_shim import BenchError
+from bench.contenders.latency_contenders import Call, Contender, LaneForm, contenders
+from bench.figures.latency_figure import draw
+from bench.support import report
+from bench.support.options import listed, scene_parser
+from bench.support.rays import KINDS, Rays, recorded_rays
+from bench.support.scenes import SceneFolder
+from bench.support.timing import QUICK, Effort, one_core
 
 PARTS = ("curve", "compare")
 CURVE_SCENE = 0  # of the scenes asked for: the first, the smallest unless named
@@ -65,7 +65,7 @@ def main(options: Sequence[str]) -> None:
                     curve.append({"scene": mesh.name, "rays": rays.kind, **row})
                     report.print_progress(row, ("contender", "batch", "p50_us", "mrays"))
     if "compare" in chosen.parts and device:
-        from bench.warp_race import compare_rows, mean_rows
+        from bench.contenders.warp_race import compare_rows, mean_rows
 
         effort = QUICK if chosen.quick else Effort()
         for name in names:
@@ -130,7 +130,7 @@ def measured(calls: Sequence[Call], budget: float) -> list[float]:
 def warp_device(name: str | None) -> tuple[str, report.Row]:
     """The Warp device to measure, and what is to be known of it; "" where there is no Warp."""
     import wive
-    from wive.devices import resolve_device
+    from wive._internal.devices import resolve_device
 
     backend = wive.backends()["warp"]
     if not backend.usable:

@@ -20,14 +20,14 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from bench import report
-from bench.compiled_shim import BenchError
-from bench.embree_race import TUNED
-from bench.options import listed, scene_parser
-from bench.order_figure import draw
-from bench.rays import Rays, recorded_rays
-from bench.scenes import Mesh, SceneFolder
-from bench.timing import QUICK, Effort, compare_in_turn, geometric_mean, one_core, timed
+from bench.contenders.compiled_shim import BenchError
+from bench.contenders.embree_race import TUNED
+from bench.figures.order_figure import draw
+from bench.support import report
+from bench.support.options import listed, scene_parser
+from bench.support.rays import Rays, recorded_rays
+from bench.support.scenes import Mesh, SceneFolder
+from bench.support.timing import QUICK, Effort, compare_in_turn, geometric_mean, one_core, timed
 from wive import _cpu
 
 Order = Literal["treelet", "diagonal", "slots", "none"]

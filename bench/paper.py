@@ -24,14 +24,14 @@ import matplotlib
 import numpy as np
 from numpy.typing import NDArray
 
-from bench import report
+from bench.contenders.embree_race import TUNED, Contender, embree_tree
+from bench.contenders.native_embree import EmbreeMesh
 from bench.embree import usable_kernels
-from bench.embree_race import TUNED, Contender, embree_tree
-from bench.features import Accuracy, build_tree
-from bench.native_embree import EmbreeMesh
-from bench.options import in_flights, listed, scene_parser
-from bench.scenes import Mesh, SceneFolder
-from bench.timing import Comparison, geometric_mean, one_core
+from bench.support import report
+from bench.support.features import Accuracy, build_tree
+from bench.support.options import in_flights, listed, scene_parser
+from bench.support.scenes import Mesh, SceneFolder
+from bench.support.timing import Comparison, geometric_mean, one_core
 from wive import _cpu
 from wive.camera import Camera
 

@@ -17,15 +17,15 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from bench import report
-from bench.options import scene_parser
-from bench.pareto_contenders import CONTENDERS, Array, Contender, contenders, exact_prims
-from bench.pareto_figure import draw
-from bench.pareto_scenes import COLUMNS as SCENE_COLUMNS
-from bench.pareto_scenes import MEAN_COLUMNS, mean_rows, names_of, scene_rows
-from bench.scenes import SceneFolder
-from bench.speeds import speeds
-from bench.timing import QUICK, Effort
+from bench.contenders.pareto_contenders import CONTENDERS, Array, Contender, contenders, exact_prims
+from bench.contenders.speeds import speeds
+from bench.figures.pareto_figure import draw
+from bench.support import report
+from bench.support.options import scene_parser
+from bench.support.pareto_scenes import COLUMNS as SCENE_COLUMNS
+from bench.support.pareto_scenes import MEAN_COLUMNS, mean_rows, names_of, scene_rows
+from bench.support.scenes import SceneFolder
+from bench.support.timing import QUICK, Effort
 
 SUBDIVISIONS, QUICK_SUBDIVISIONS = 6, 4
 SCALES = (1e-6, 1e-3, 1.0, 1e3, 1e6)

@@ -15,13 +15,22 @@ from collections.abc import Iterator, Sequence
 import matplotlib
 import numpy as np
 
-from bench import report
+from bench.contenders.python_callers import ALL, QUERIES, SCENE, Caller, Ours, absent, answered, others
 from bench.latency import QUICK_SECONDS, measured
-from bench.options import listed, scene_parser
-from bench.python_callers import ALL, QUERIES, SCENE, Caller, Ours, absent, answered, others
-from bench.rays import Rays, recorded_rays
-from bench.scenes import Mesh, SceneFolder
-from bench.timing import QUICK, Effort, compare, core_count, geometric_mean, one_core, timed, wall_timed
+from bench.support import report
+from bench.support.options import listed, scene_parser
+from bench.support.rays import Rays, recorded_rays
+from bench.support.scenes import Mesh, SceneFolder
+from bench.support.timing import (
+    QUICK,
+    Effort,
+    compare,
+    core_count,
+    geometric_mean,
+    one_core,
+    timed,
+    wall_timed,
+)
 
 matplotlib.use("Agg")
 from matplotlib import pyplot

@@ -8,11 +8,11 @@ thread, A, B, A, B.
 import argparse
 from collections.abc import Sequence
 
-from bench import report
-from bench.options import scene_parser
-from bench.rays import Rays, recorded_rays
-from bench.scenes import Mesh, SceneFolder
-from bench.timing import QUICK, Effort, compare, geometric_mean, timed
+from bench.support import report
+from bench.support.options import scene_parser
+from bench.support.rays import Rays, recorded_rays
+from bench.support.scenes import Mesh, SceneFolder
+from bench.support.timing import QUICK, Effort, compare, geometric_mean, timed
 from wive import _cpu
 
 KINDS = ("primary", "diffuse", "random")

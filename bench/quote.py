@@ -10,8 +10,8 @@ import re
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
-from bench import report
-from bench.timing import geometric_mean
+from bench.support import report
+from bench.support.timing import geometric_mean
 
 DOCUMENT = report.REPOSITORY / "docs" / "benchmarks.md"
 QUOTE = re.compile(r"(<!-- quote: ([\w.]+) -->\n).*?(<!-- end -->)", re.DOTALL)

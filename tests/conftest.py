@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import wive
-from wive import devices
+from wive._internal import devices
 
 SCENES = Path(__file__).resolve().parents[2] / "shared" / "scenes"
 BACKENDS = wive.backends()

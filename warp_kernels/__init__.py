@@ -21,12 +21,12 @@ Functions for users' own kernels take `tree.handle`, whose type says the accurac
 Hits are those of the C++ backends, bit for bit: t is infinity, prim -1 and u, v NaN where a ray misses.
 """
 
-from wive.warp_kernels.functions import any_hit, closest_hit, count_hits
-from wive.warp_kernels.gradients import SurfaceHit, differentiable_hit
-from wive.warp_kernels.handle import Bvh, ExactBvh, FastBvh, Hit
-from wive.warp_kernels.launch import launch_any, launch_closest
-from wive.warp_kernels.launch_all import MOST_HITS, launch_all, launch_count, scan_counts
-from wive.warp_kernels.tree import CorruptTreeError, Tree, check, upload
+from wive.warp_kernels.functions.functions import any_hit, closest_hit, count_hits
+from wive.warp_kernels.functions.gradients import SurfaceHit, differentiable_hit
+from wive.warp_kernels.launching.launch import launch_any, launch_closest
+from wive.warp_kernels.launching.launch_all import MOST_HITS, launch_all, launch_count, scan_counts
+from wive.warp_kernels.tree.handle import Bvh, ExactBvh, FastBvh, Hit
+from wive.warp_kernels.tree.tree import CorruptTreeError, Tree, check, upload
 
 __all__ = [
     "MOST_HITS",

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from wive._internal.precision import Floats
 from wive.hits import surface_normals, surface_points
-from wive.precision import Floats
 
 
 @dataclass(frozen=True, eq=False, repr=False)

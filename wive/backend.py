@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 
 from wive import _cpu
-from wive.arguments import choice
-from wive.devices import resolve_device, warp_devices, warp_problem
+from wive._internal.arguments import choice
+from wive._internal.devices import resolve_device, warp_devices, warp_problem
 
 CPU_BACKENDS = ("avx512", "avx2", "scalar")
 WARP = "warp"

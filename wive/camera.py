@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from wive import arguments
+from wive._internal import arguments
 
 # A mesh this much thinner on one axis than on the others is taken to lie flat, that axis pointing up.
 FLATNESS = 0.4

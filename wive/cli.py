@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import NoReturn
 
 import wive
-from wive import commands
+from wive._internal import commands
 from wive.backend import CPU_BACKENDS, WARP
 from wive.rendering import ALBEDOS, Settings
 

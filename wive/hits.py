@@ -7,12 +7,13 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from wive import _cpu, arguments
-from wive.arrays import Library, host_array
-from wive.error_bounds import t_error_bounds
-from wive.precision import Floats, real_of
-from wive.rays import Rays
-from wive.spawn import spawn_origins
+from wive import _cpu
+from wive._internal import arguments
+from wive._internal.arrays import Library, host_array
+from wive._internal.error_bounds import t_error_bounds
+from wive._internal.precision import Floats, real_of
+from wive._internal.rays import Rays
+from wive._internal.spawn import spawn_origins
 
 
 class Stats(NamedTuple):
@@ -160,7 +161,7 @@ class WrappedHits(Hits):
     _wrap: Callable[[Any], Any]
 
     def __init__(self, home: Any, wrap: Callable[[Any], Any]) -> None:
-        """Wrap t, prim and uv of `home`, a `Hits` or a `wive.warp_hits.WarpHits`; the rest when asked for."""
+        """Wrap t, prim and uv of `home`, a `Hits` or a `WarpHits`; the rest when asked for."""
         super().__init__(wrap(home.t), wrap(home.prim), wrap(home.uv), home.vertices, home.faces)
         object.__setattr__(self, "_home", home)
         object.__setattr__(self, "_wrap", wrap)

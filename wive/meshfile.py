@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from wive.files import PathLike
-from wive.npzfile import check_input, read_npz
-from wive.precision import real_named
+from wive._internal.files import PathLike
+from wive._internal.npzfile import check_input, read_npz
+from wive._internal.precision import real_named
 
 
 def load_mesh(

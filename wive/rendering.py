@@ -7,10 +7,10 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from wive import arguments
+from wive._internal import arguments
+from wive._internal.files import PathLike, atomic_write, check_output
+from wive._internal.progress import progress_bar
 from wive.camera import Camera
-from wive.files import PathLike, atomic_write, check_output
-from wive.progress import progress_bar
 from wive.scene import Scene
 
 Image = NDArray[np.float32]
@@ -106,9 +106,10 @@ def _rows_renderer(scene: Scene, frame: Image, image: Image, settings: Settings)
     """A function that renders rows [begin, end) into `image` and returns how many rays it traced."""
     what = (settings.spp, settings.bounces, settings.albedo, settings.seed)
     if scene._warp is not None:
-        from wive.warp_render import PictureRenderer
+        from wive.warp_kernels.scene.render import PictureRenderer
 
-        return PictureRenderer(scene._warp, frame, image, *what).render_rows
+        renderer: Callable[[int, int], int] = PictureRenderer(scene._warp, frame, image, *what).render_rows
+        return renderer
     threads = arguments.threads(settings.threads)
     bvh = scene._bvh  # one picture shows one shape, whatever refits happen meanwhile
     return lambda begin, end: bvh.render_rows(scene.backend, frame, image, begin, end, *what, threads)

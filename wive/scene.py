@@ -6,21 +6,22 @@ from typing import TYPE_CHECKING, Any, Literal, overload
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
-from wive import _cpu, arguments
-from wive.arrays import NUMPY, host_array
+from wive import _cpu
+from wive._internal import arguments
+from wive._internal.arrays import NUMPY, host_array
+from wive._internal.crossings import CrossingQueries, LanesOption
+from wive._internal.files import PathLike
+from wive._internal.precision import FLOAT32, Floats, real_of
+from wive._internal.properties import SceneProperties
+from wive._internal.rays import check_rays
+from wive._internal.refit import Refittable
+from wive._internal.storage import Options, read_scene, write_scene
 from wive.backend import resolve_backend
-from wive.crossings import CrossingQueries, LanesOption
-from wive.files import PathLike
 from wive.hits import Hits, Stats, WrappedHits, stats_of
 from wive.meshfile import load_mesh
-from wive.precision import FLOAT32, Floats, real_of
-from wive.properties import SceneProperties
-from wive.rays import check_rays
-from wive.refit import Refittable
-from wive.storage import Options, read_scene, write_scene
 
 if TYPE_CHECKING:
-    from wive.warp_tracer import WarpTracer
+    from wive.warp_kernels.scene.tracer import WarpTracer
 
 
 class Scene(Refittable, CrossingQueries, SceneProperties):
@@ -77,7 +78,7 @@ class Scene(Refittable, CrossingQueries, SceneProperties):
         self._real = real_of(vertices)
         self._bvh = _cpu.Bvh(vertices, self._faces, accuracy, nodes=nodes, quality=quality)
         if self._device is not None:
-            from wive.warp_tracer import WarpTracer
+            from wive.warp_kernels.scene.tracer import WarpTracer
 
             self._warp = WarpTracer(self._bvh, vertices, self._faces, self._device)
 

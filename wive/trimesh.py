@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from wive import _cpu
-from wive.precision import Floats, real_named
+from wive._internal.precision import Floats, real_named
 from wive.scene import Scene
 
 Float64 = NDArray[np.float64]

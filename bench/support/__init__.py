@@ -1,0 +1,1 @@
+"""What benches share: options, scenes, rays, timing, reports."""

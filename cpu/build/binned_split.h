@@ -1,0 +1,106 @@
+// Where to split a range of triangles: binned surface area heuristic (Wald 2007, "On fast Construction of SAH-based
+// Bounding Volume Hierarchies"), all three axes in one pass.
+#pragma once
+
+#include <cstdint>
+
+#include "build/binary_tree.h"
+#include "core/box.h"
+#include "build/mesh.h"
+
+namespace wive {
+
+inline constexpr int max_bins = 32;
+
+struct Range {
+    Subtree tree;
+    int depth;
+    Box box, centroids;
+
+    void grow(const PrimRef& ref) {
+        box.grow(ref.box());
+        centroids.grow(ref.centroid());
+    }
+    void grow(const Range& other) {
+        box.grow(other.box);
+        centroids.grow(other.centroids);
+    }
+};
+
+struct Split {
+    int axis = -1;  // -1: no plane separates the centroids, halve the range
+    int bin = 0;    // bins below go left
+};
+
+// Maps a centroid to its bin on each axis. Small ranges get few bins, as in Embree.
+struct BinMap {
+    Float4v base, scale;
+    int count;
+
+    explicit BinMap(const Range& range) : base(range.centroids.lo), count(bins_for(range.tree.size())) {
+        const Float4v extent = range.centroids.hi - range.centroids.lo;
+        const Float4v none = {};
+        scale = extent > 1e-34f ? 0.9999f * static_cast<float>(count) / extent : none;
+    }
+    static int bins_for(std::uint32_t size) {
+        return size < 560 ? static_cast<int>(4.0f + 0.05f * static_cast<float>(size)) : max_bins;
+    }
+    Int4v operator()(Float4v centroid) const { return __builtin_convertvector((centroid - base) * scale, Int4v); }
+
+    // Whether a reference falls into a bin below the split's: one axis of the same arithmetic, read from memory.
+    bool goes_left(const PrimRef& ref, Split split) const {
+        const float centroid = ref.lo[split.axis] + ref.hi[split.axis];
+        return (centroid - base[split.axis]) * scale[split.axis] < static_cast<float>(split.bin);
+    }
+};
+
+struct Bins {
+    Box box[max_bins][3];
+    alignas(16) std::int32_t count[max_bins][4];
+
+    explicit Bins(int bins) {
+        for (int i = 0; i < bins; ++i) {
+            for (int axis = 0; axis < 3; ++axis) box[i][axis] = Box{};
+            for (std::int32_t& n : count[i]) n = 0;
+        }
+    }
+    void add(const PrimRef& ref, const BinMap& bin_of) {
+        const Int4v bin = bin_of(ref.centroid());
+        for (int axis = 0; axis < 3; ++axis) {
+            box[bin[axis]][axis].grow(ref.box());
+            ++count[bin[axis]][axis];
+        }
+    }
+    void add(const PrimRef* begin, const PrimRef* end, const BinMap& bin_of) {
+        constexpr std::ptrdiff_t many = 256;
+        if (end - begin >= many) {
+            // Neighbours mostly fall into the same bin and would wait for each other's stores: both halves in turn.
+            Bins other(bin_of.count);
+            const PrimRef* const middle = begin + (end - begin) / 2;
+            for (const PrimRef *a = begin, *b = middle; a < middle; ++a, ++b) {
+                add(*a, bin_of);
+                other.add(*b, bin_of);
+            }
+            begin = middle + (middle - begin);
+            add(other, bin_of.count);
+        }
+        for (const PrimRef* ref = begin; ref < end; ++ref) add(*ref, bin_of);
+    }
+    void add(const Bins& other, int bins) {
+        for (int i = 0; i < bins; ++i)
+            for (int axis = 0; axis < 3; ++axis) {
+                box[i][axis].grow(other.box[i][axis]);
+                count[i][axis] += other.count[i][axis];
+            }
+    }
+    // How many references fall into bins below the split's.
+    std::uint32_t count_left(Split split) const {
+        std::int32_t n = 0;
+        for (int i = 0; i < split.bin; ++i) n += count[i][split.axis];
+        return static_cast<std::uint32_t>(n);
+    }
+};
+
+Split best_split(const Bins& bins, const BinMap& bin_of);
+
+}  // namespace wive

@@ -1,0 +1,118 @@
+#include "build/builder.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+#include "build/binary_tree.h"
+#include "build/emit.h"
+#include "core/parallel.h"
+#include "build/reinsertion.h"
+#include "build/write_node.h"
+
+namespace wive {
+
+namespace {
+
+// In blocks of four triangles.
+constexpr std::uint32_t largest_leaf(Precision precision, NodeForm form) {
+    const bool shared = precision == Precision::float32 && form == NodeForm::compressed;
+    return shared ? max_compressed_leaf / block_width : max_leaf_blocks;
+}
+
+}  // namespace
+
+template <class Real>
+Bvh::Bvh(const Mesh<Real>& mesh, const BuildOptions& options)
+    : accuracy_(options.accuracy), precision_(precision_of<Real>), form_(options.nodes) {
+    constexpr bool doubles = precision_of<Real> == Precision::float64;
+    Threads threads(thread_count(options.threads));
+    if (mesh.face_count >= leaf_bit) throw std::invalid_argument("faces: too many triangles for one scene");
+    if (doubles && accuracy_ == Accuracy::exact)
+        throw std::invalid_argument("accuracy: 'exact' takes vertices in float32, got float64; round them, or use 'watertight'");
+    check_mesh(mesh, threads);
+    if constexpr (doubles) set_bounds(find_bounds(mesh, threads));
+    const auto plant = [&] {
+        return build_binary_tree(make_prim_refs(mesh, center_, threads), threads, options.depth_limit,
+                                 largest_leaf(precision_, form_));
+    };
+    BinaryTree tree = plant();
+    if (options.quality == Quality::high) optimize_by_reinsertion(tree, threads);
+    triangle_count_ = tree.count;
+    const Point still_to_center = settle(tree.box);
+    EmittedTree emitted = emit_tree(tree, mesh, options, still_to_center, threads);
+    if (emitted.depth > options.depth_limit) {  // reinsertion knows no limit, binning does
+        tree = plant();
+        emitted = emit_tree(tree, mesh, options, still_to_center, threads);
+    }
+    units_ = std::move(emitted.units);
+    node_count_ = emitted.node_count;
+    depth_ = emitted.depth;
+}
+
+template Bvh::Bvh(const Mesh<float>&, const BuildOptions&);
+template Bvh::Bvh(const Mesh<double>&, const BuildOptions&);
+
+// Far from the origin, planes relative to the middle keep the boxes' slack small. Near it, they are left as they are, and so
+// stay exact.
+void Bvh::set_bounds(const Bounds& bounds) {
+    bounds_ = bounds;
+    const auto& [low, high] = bounds_;
+    if (!(low[0] <= high[0])) return;
+    const double size = 0.5 * std::max({high[0] - low[0], high[1] - low[1], high[2] - low[2]});
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+        const double middle = 0.5 * low[axis] + 0.5 * high[axis];
+        center_[axis] = std::abs(middle) > 4 * size ? static_cast<float>(middle) : 0.0f;
+    }
+}
+
+// What follows from the box of all triangles. Float32 trees learn their bounds from it; float64 trees had to know them before,
+// and their boxes are relative to the centre already. Returns what boxes are still to be taken relative to.
+Point Bvh::settle(const Box& all) {
+    Point still_to_center{};
+    if (precision_ == Precision::float32) {
+        set_bounds({{{all.lo[0], all.lo[1], all.lo[2]}, {all.hi[0], all.hi[1], all.hi[2]}}});
+        still_to_center = center_;
+    }
+    if (all.lo[0] <= all.hi[0])
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+            const float center = still_to_center[axis];
+            extent_[axis] = std::max(plane_above(all.hi[axis], center), -plane_below(all.lo[axis], center));
+        }
+    return still_to_center;
+}
+
+BvhView Bvh::view() const {
+    return {units_.data(), {center_[0], center_[1], center_[2], 0}, {extent_[0], extent_[1], extent_[2], 0}};
+}
+
+template <class StoredNode>
+Bvh::Sah Bvh::sah_of(double root) const {
+    const auto half_area = [](const StoredNode& node, int lane) {
+        double d[3];
+        for (int axis = 0; axis < 3; ++axis) d[axis] = node.plane(2 * axis + 1, lane) - node.plane(2 * axis, lane);
+        return d[0] < 0 ? 0.0 : d[0] * d[1] + d[1] * d[2] + d[2] * d[0];
+    };
+    Sah sah = {1, 0};
+    for (const StoredNode& node : std::span(reinterpret_cast<const StoredNode*>(units_.data()), node_count_))
+        for (int lane = 0; lane < node_width; ++lane) {
+            const std::uint32_t child = node.child[lane];
+            const double area = half_area(node, lane) / root;
+            if (is_inner(child))
+                sah.nodes += area;
+            else
+                sah.blocks += area * leaf_block_count(child);
+        }
+    return sah;
+}
+
+Bvh::Sah Bvh::sah() const {
+    double d[3];
+    for (std::size_t axis = 0; axis < 3; ++axis) d[axis] = bounds_[1][axis] - bounds_[0][axis];
+    const double root = d[0] * d[1] + d[1] * d[2] + d[2] * d[0];
+    if (!(root > 0 && root < std::numeric_limits<double>::infinity())) return {0, 0};
+    return form_ == NodeForm::float32 ? sah_of<Node>(root) : sah_of<CompressedNode>(root);
+}
+
+}  // namespace wive

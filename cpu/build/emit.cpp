@@ -1,0 +1,220 @@
+#include "build/emit.h"
+
+#include <algorithm>
+#include <span>
+#include <stdexcept>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+#include "build/any_hit_order.h"
+#include "build/collapse.h"
+#include "core/parallel.h"
+#include "build/write_compressed.h"
+#include "build/write_float32.h"
+#include "build/write_node.h"
+
+namespace wive {
+
+namespace {
+
+// Subtrees that one thread emits: about so many, of so many triangles at most and at least.
+constexpr std::uint32_t subtree_count = 64, largest_subtree = 1 << 14, smallest_subtree = 1 << 10;
+
+// A leaf's triangles by rising number.
+class LeafPrims {
+public:
+    LeafPrims(const BinaryTree& tree, const Subtree& leaf) : count_(leaf.size()) {
+        for (std::uint32_t i = 0; i < count_; ++i) prims_[i] = tree.refs[leaf.begin + i].prim();
+        std::sort(prims_.begin(), prims_.begin() + count_);
+    }
+    std::span<const std::uint32_t> span() const { return {prims_.data(), count_}; }
+
+private:
+    std::array<std::uint32_t, block_width * max_leaf_blocks> prims_;
+    std::uint32_t count_;
+};
+
+// Plans where everything goes; Writer knows what the nodes and blocks there look like.
+template <class Writer, class Real>
+class Emitter {
+    using StoredNode = typename Writer::Node;
+
+public:
+    Emitter(const BinaryTree& tree, const Mesh<Real>& mesh, const BuildOptions& options, const std::array<float, 3>& center)
+        : tree_(tree), mesh_(mesh), options_(options), center_(center) {}
+
+    using Size = TreeSize;
+
+    EmittedTree emit(Threads& threads) {
+        coverage_ = Coverage(tree_, threads);
+        // First the top of the tree, which only plans; then each subtree below it, at a place known by its size.
+        Treelet root = gather_root(tree_);
+        stand_for_any_hit(tree_, coverage_, root);
+        std::vector<Part> subtrees;
+        Size top = {1, 0};
+        plan_top(root, 1, top, subtrees);
+        parallel_for(subtrees.size(), threads, [&](std::size_t i) { subtrees[i].size = size_of(subtrees[i].slot); });
+        Size total = top;
+        for (Part& subtree : subtrees) {
+            subtree.first = total;
+            total.nodes += subtree.size.nodes;
+            total.leaf_units += subtree.size.leaf_units;
+        }
+        const std::size_t node_bytes = total.nodes * sizeof(StoredNode);
+        const std::size_t bytes = node_bytes + total.leaf_units * unit_bytes;
+        if (bytes / unit_bytes > max_units) throw std::invalid_argument("faces: too many triangles for one scene");
+        LargeArray<std::byte> units(bytes);
+        nodes_ = reinterpret_cast<StoredNode*>(units.data());
+        leaves_ = units.data() + node_bytes;
+        first_leaf_unit_ = node_bytes / unit_bytes;
+        const std::size_t count = subtrees.size() + 1;  // and the top
+        parallel_for(count, threads, [&](std::size_t i) {
+            const std::size_t k = far_apart(i, count);
+            if (k == subtrees.size()) {
+                std::size_t next_node = 1;
+                const Part* next_subtree = subtrees.data();
+                emit_top(root, 0, next_node, next_subtree);
+            } else if (Part& subtree = subtrees[k]; !subtree.slot.leaf) {
+                Size at = subtree.first;
+                subtree.depth += emit_subtree(subtree.slot, subtree.node, at);
+            }
+        });
+        int depth = 1;
+        for (const Part& subtree : subtrees) depth = std::max(depth, subtree.depth);
+        return {std::move(units), total.nodes, depth};
+    }
+
+private:
+    // A slot whose whole content one thread emits, but for its own node's lane in the node above.
+    struct Part {
+        Slot slot;
+        std::size_t node;  // where its own goes
+        int depth;         // of the node above, the root's being 1; in the end of the deepest below
+        Size size = {}, first = {};
+    };
+    using Children = std::array<std::uint32_t, node_width>;
+
+    static std::uint32_t node_child(std::size_t node) { return inner_child(node * (sizeof(StoredNode) / unit_bytes)); }
+
+    bool is_top(const Slot& slot) const { return !slot.leaf && slot.tree.size() > subtree_size_; }
+
+    Treelet treelet_of(const Slot& slot) const {
+        Treelet treelet = gather_treelet(tree_, slot.tree);
+        stand_for_any_hit(tree_, coverage_, treelet);
+        return treelet;
+    }
+
+    static std::size_t inner_count(const Treelet& treelet) {
+        return static_cast<std::size_t>(std::count_if(treelet.slots.begin(), treelet.slots.begin() + treelet.count,
+                                                      [](const Slot& slot) { return !slot.leaf; }));
+    }
+
+    void plan_top(const Treelet& treelet, int depth, Size& top, std::vector<Part>& subtrees) const {
+        std::size_t child_node = top.nodes;
+        top.nodes += inner_count(treelet);
+        for (int i = 0; i < treelet.count; ++i) {
+            const Slot& slot = treelet.slots[static_cast<std::size_t>(i)];
+            const std::size_t node = slot.leaf ? 0 : child_node++;
+            if (is_top(slot))
+                plan_top(treelet_of(slot), depth + 1, top, subtrees);
+            else
+                subtrees.push_back({slot, node, depth});
+        }
+    }
+
+    Size size_of(const Slot& slot) const {
+        return measure(tree_, slot, [&](const Subtree& leaf) -> std::size_t {
+            if constexpr (requires { Writer::leaf_units(leaf.size()); })
+                return Writer::leaf_units(leaf.size());
+            else
+                return Writer::leaf_size(mesh_, LeafPrims(tree_, leaf).span()).units;
+        });
+    }
+
+    void emit_top(const Treelet& treelet, std::size_t place, std::size_t& next_node, const Part*& next_subtree) {
+        std::size_t child_node = next_node;
+        next_node += inner_count(treelet);
+        Children children{};
+        for (int i = 0; i < treelet.count; ++i) {
+            const Slot& slot = treelet.slots[static_cast<std::size_t>(i)];
+            std::uint32_t& child = children[static_cast<std::size_t>(i)];
+            const std::size_t node = slot.leaf ? 0 : child_node++;
+            child = node_child(node);
+            if (is_top(slot)) {
+                emit_top(treelet_of(slot), node, next_node, next_subtree);
+            } else {
+                Size at = next_subtree++->first;
+                if (slot.leaf) child = write_leaf(slot, at);
+            }
+        }
+        write_node(nodes_[place], treelet, children);
+    }
+
+    // Returns the depth of the subtree, its root counted.
+    int emit_subtree(const Slot& slot, std::size_t place, Size& cursor) {
+        const Treelet treelet = treelet_of(slot);
+        Children children{};
+        std::size_t child_node = cursor.nodes;
+        for (int i = 0; i < treelet.count; ++i) {
+            const Slot& child = treelet.slots[static_cast<std::size_t>(i)];
+            children[static_cast<std::size_t>(i)] = child.leaf ? write_leaf(child, cursor) : node_child(cursor.nodes++);
+        }
+        write_node(nodes_[place], treelet, children);
+        int deepest = 0;
+        for (int i = 0; i < treelet.count; ++i) {
+            const Slot& child = treelet.slots[static_cast<std::size_t>(i)];
+            if (!child.leaf) deepest = std::max(deepest, emit_subtree(child, child_node++, cursor));
+        }
+        return deepest + 1;
+    }
+
+    void write_node(StoredNode& out, const Treelet& treelet, const Children& children) const {
+        Node node;
+        for (int i = 0; i < node_width; ++i) {
+            write_box(node, i, i < treelet.count ? tree_.box_of(treelet.slots[static_cast<std::size_t>(i)].tree) : Box{}, center_);
+            node.child[i] = children[static_cast<std::size_t>(i)];
+        }
+        const SlotSequences order = options_.order == ChildOrder::treelet    ? treelet.order
+                                    : options_.order == ChildOrder::diagonal ? sort_along_diagonals(node, treelet.count)
+                                    : options_.order == ChildOrder::slots    ? assign_places(node, treelet.count)
+                                                                             : shuffle(node, treelet.count);
+        write_order(node, order, treelet.count);
+        Writer::write_node(node, treelet.count, out);
+    }
+
+    std::uint32_t write_leaf(const Slot& slot, Size& cursor) const {
+        const LeafPrims prims(tree_, slot.tree);
+        const std::size_t first = cursor.leaf_units;
+        const LeafSize size =
+            Writer::write_leaf(mesh_, options_.accuracy, prims.span(), leaves_ + first * unit_bytes);
+        cursor.leaf_units += size.units;
+        return leaf_child(first_leaf_unit_ + first, size.blocks);
+    }
+
+    const BinaryTree& tree_;
+    const Mesh<Real>& mesh_;
+    const BuildOptions& options_;
+    const std::array<float, 3>& center_;
+    std::uint32_t subtree_size_ = std::clamp(tree_.count / subtree_count, smallest_subtree, largest_subtree);
+    Coverage coverage_;
+    StoredNode* nodes_ = nullptr;
+    std::byte* leaves_ = nullptr;
+    std::size_t first_leaf_unit_ = 0;
+};
+
+}  // namespace
+
+template <class Real>
+EmittedTree emit_tree(const BinaryTree& tree, const Mesh<Real>& mesh, const BuildOptions& options,
+                      const std::array<float, 3>& center, Threads& threads) {
+    using Compressed = std::conditional_t<precision_of<Real> == Precision::float32, CompressedWriter, CompressedFloat64Writer>;
+    if (options.nodes == NodeForm::compressed)
+        return Emitter<Compressed, Real>(tree, mesh, options, center).emit(threads);
+    return Emitter<Float32Writer<Real>, Real>(tree, mesh, options, center).emit(threads);
+}
+
+template EmittedTree emit_tree(const BinaryTree&, const Mesh<float>&, const BuildOptions&, const std::array<float, 3>&, Threads&);
+template EmittedTree emit_tree(const BinaryTree&, const Mesh<double>&, const BuildOptions&, const std::array<float, 3>&, Threads&);
+
+}  // namespace wive

@@ -1,0 +1,232 @@
+#include "build/mesh.h"
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <sstream>
+#include <stdexcept>
+#include <type_traits>
+#include <vector>
+
+#include "build/exact.h"
+#include "core/layout.h"
+#include "core/parallel.h"
+#include "core/planes.h"
+
+namespace wive {
+namespace {
+
+constexpr std::size_t chunk_size = 1 << 14;
+
+// The lowest index in [0, count) for which is_bad holds, or count. Chunks are asked as a whole first, by has_bad.
+template <class HasBad, class IsBad>
+std::size_t first_bad(std::size_t count, Threads& threads, const HasBad& has_bad, const IsBad& is_bad) {
+    std::atomic<std::size_t> first{count};
+    parallel_chunks(count, chunk_size, threads, [&](std::size_t begin, std::size_t end) {
+        if (!has_bad(begin, end)) return;
+        for (std::size_t i = begin; i < end; ++i) {
+            if (!is_bad(i)) continue;
+            std::size_t seen = first.load();
+            while (i < seen && !first.compare_exchange_weak(seen, i)) {
+            }
+            return;
+        }
+    });
+    return first.load();
+}
+
+// Whether the three corners don't lie on one line, decided exactly: they do where all three projections have area zero.
+template <class Real>
+bool has_area(const Real* a, const Real* b, const Real* c) {
+    for (int k = 0; k < 3; ++k) {
+        const int i = (k + 1) % 3, j = (k + 2) % 3;
+        const Real p[2] = {a[i], a[j]}, q[2] = {b[i], b[j]}, r[2] = {c[i], c[j]};
+        if (orientation(p, q, r) != 0) return true;
+    }
+    return false;
+}
+
+Float4v yzx(Float4v x) { return __builtin_shufflevector(x, x, 1, 2, 0, 3); }
+Float4v magnitude(Float4v x) { return maximum(x, Float4v{} - x); }
+
+float projected_area(Float4v a, Float4v b, Float4v c) {
+    const Float4v u = b - a, v = c - a, areas = magnitude(u * yzx(v) - yzx(u) * v);
+    return areas[0] + areas[1] + areas[2];
+}
+
+// Settles it for most: some component of the cross product is larger than its rounding error. Differences and products
+// are off by a unit roundoff u each, sums of two by another: 4u of both products' sizes, taken twice as large, and what
+// underflow may add.
+bool surely_has_area(Float4v a, Float4v b, Float4v c) {
+    constexpr float error = 4 * std::numeric_limits<float>::epsilon(), underflow = 4 * std::numeric_limits<float>::min();
+    const Float4v u = b - a, v = c - a;
+    const Float4v left = u * yzx(v), right = yzx(u) * v;
+    const Float4v cross = left - right;
+    const Int4v sure = magnitude(cross) > error * (magnitude(left) + magnitude(right)) + underflow;
+    return (sure[0] | sure[1] | sure[2]) != 0;
+}
+
+bool surely_has_area(const double* a, const double* b, const double* c) {
+    constexpr double error = 4 * std::numeric_limits<double>::epsilon(), underflow = 4 * std::numeric_limits<double>::min();
+    const double u[3] = {b[0] - a[0], b[1] - a[1], b[2] - a[2]}, v[3] = {c[0] - a[0], c[1] - a[1], c[2] - a[2]};
+    bool sure = false;
+    for (int k = 0; k < 3; ++k) {
+        const int i = (k + 1) % 3, j = (k + 2) % 3;
+        const double left = u[i] * v[j], right = u[j] * v[i];
+        sure |= std::abs(left - right) > error * (std::abs(left) + std::abs(right)) + underflow;
+    }
+    return sure;
+}
+
+float projected_area(const double* a, const double* b, const double* c) {
+    double sum = 0;
+    for (int k = 0; k < 3; ++k) {
+        const int i = (k + 1) % 3, j = (k + 2) % 3;
+        sum += std::abs((b[i] - a[i]) * (c[j] - a[j]) - (b[j] - a[j]) * (c[i] - a[i]));
+    }
+    return static_cast<float>(sum);
+}
+
+// A vertex, with a zero in the fourth lane.
+Float4v load_vertex(const Mesh<float>& mesh, std::int32_t index) {
+    const float* v = mesh.vertices + 3 * static_cast<std::size_t>(index);
+    if (static_cast<std::size_t>(index) + 1 == mesh.vertex_count) return Float4v{v[0], v[1], v[2], 0};
+    Int4v bits;
+    std::memcpy(&bits, v, sizeof bits);
+    const Int4v xyz = {-1, -1, -1, 0};
+    return std::bit_cast<Float4v>(bits & xyz);
+}
+
+}  // namespace
+
+template <class Real>
+void check_mesh(const Mesh<Real>& mesh, Threads& threads) {
+    if (mesh.vertex_count > std::numeric_limits<std::int32_t>::max())
+        throw std::invalid_argument("vertices: expected at most 2147483647, split the mesh into several scenes");
+    // Without a branch, so that compilers take several at a time. Bits of magnitudes compare as the magnitudes do,
+    // those of infinities and NaNs above all others.
+    const auto bad_vertices = [&](std::size_t begin, std::size_t end) {
+        using Bits = std::conditional_t<sizeof(Real) == sizeof(float), std::int32_t, std::int64_t>;
+        constexpr Bits largest = std::bit_cast<Bits>(max_coordinate<Real>), magnitude = std::numeric_limits<Bits>::max();
+        Bits bad = 0;
+        for (std::size_t i = 3 * begin; i < 3 * end; ++i) bad |= largest - (std::bit_cast<Bits>(mesh.vertices[i]) & magnitude);
+        return bad < 0;
+    };
+    const auto bad_vertex = [&](std::size_t i) { return bad_vertices(i, i + 1); };
+    if (const std::size_t i = first_bad(mesh.vertex_count, threads, bad_vertices, bad_vertex); i < mesh.vertex_count) {
+        const Real* v = mesh.vertices + 3 * i;
+        std::ostringstream text;
+        text << "vertices[" << i << "] = (" << v[0] << ", " << v[1] << ", " << v[2]
+             << "): expected finite coordinates of at most 1e18 in magnitude; remove or repair this vertex";
+        throw std::invalid_argument(text.str());
+    }
+    const auto bad_faces = [&](std::size_t begin, std::size_t end) {
+        const std::uint32_t last = static_cast<std::uint32_t>(mesh.vertex_count) - 1;
+        std::uint32_t bad = mesh.vertex_count == 0 ? ~0u : 0;
+        for (std::size_t i = 3 * begin; i < 3 * end; ++i) {
+            const std::uint32_t index = static_cast<std::uint32_t>(mesh.faces[i]);
+            bad |= index | (last - index);
+        }
+        return static_cast<std::int32_t>(bad) < 0;
+    };
+    const auto bad_face = [&](std::size_t i) { return bad_faces(i, i + 1); };
+    if (const std::size_t i = first_bad(mesh.face_count, threads, bad_faces, bad_face); i < mesh.face_count) {
+        const std::int32_t* f = mesh.faces + 3 * i;
+        std::ostringstream text;
+        text << "faces[" << i << "] = (" << f[0] << ", " << f[1] << ", " << f[2] << "): expected indices in 0.."
+             << static_cast<long long>(mesh.vertex_count) - 1 << ", there are " << mesh.vertex_count << " vertices";
+        throw std::invalid_argument(text.str());
+    }
+}
+
+template void check_mesh(const Mesh<float>&, Threads&);
+template void check_mesh(const Mesh<double>&, Threads&);
+
+bool box_triangle(const Mesh<float>& mesh, const Point&, std::size_t face, Box& box) {
+    const std::int32_t* corners = mesh.faces + 3 * face;
+    const Float4v a = load_vertex(mesh, corners[0]), b = load_vertex(mesh, corners[1]),
+                  c = load_vertex(mesh, corners[2]);
+    box = {minimum(minimum(a, b), c), maximum(maximum(a, b), c)};
+    box.hi[3] = projected_area(a, b, c);
+    return surely_has_area(a, b, c) || has_area(mesh.corner(face, 0), mesh.corner(face, 1), mesh.corner(face, 2));
+}
+
+bool box_triangle(const Mesh<double>& mesh, const Point& center, std::size_t face, Box& box) {
+    const double *a = mesh.corner(face, 0), *b = mesh.corner(face, 1), *c = mesh.corner(face, 2);
+    box.lo[3] = 0;
+    box.hi[3] = projected_area(a, b, c);
+    for (int axis = 0; axis < 3; ++axis) {
+        const float origin = center[static_cast<std::size_t>(axis)];
+        box.lo[axis] = plane_below(std::min({a[axis], b[axis], c[axis]}), origin);
+        box.hi[axis] = plane_above(std::max({a[axis], b[axis], c[axis]}), origin);
+    }
+    return surely_has_area(a, b, c) || has_area(a, b, c);
+}
+
+Bounds find_bounds(const Mesh<double>& mesh, Threads& threads) {
+    constexpr double infinity = std::numeric_limits<double>::infinity();
+    constexpr Bounds none = {{{infinity, infinity, infinity}, {-infinity, -infinity, -infinity}}};
+    const auto grow = [](Bounds& bounds, const double* low, const double* high) {
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+            bounds[0][axis] = std::min(bounds[0][axis], low[axis]);
+            bounds[1][axis] = std::max(bounds[1][axis], high[axis]);
+        }
+    };
+    std::vector<Bounds> parts((mesh.face_count + chunk_size - 1) / chunk_size, none);
+    parallel_chunks(mesh.face_count, chunk_size, threads, [&](std::size_t begin, std::size_t end) {
+        Bounds part = none;
+        for (std::size_t face = begin; face < end; ++face) {
+            const double *a = mesh.corner(face, 0), *b = mesh.corner(face, 1), *c = mesh.corner(face, 2);
+            if (!surely_has_area(a, b, c) && !has_area(a, b, c)) continue;
+            for (const double* corner : {a, b, c}) grow(part, corner, corner);
+        }
+        parts[begin / chunk_size] = part;
+    });
+    Bounds all = none;
+    for (const Bounds& part : parts) grow(all, part[0].data(), part[1].data());
+    return all;
+}
+
+template <class Real>
+PrimRefs make_prim_refs(const Mesh<Real>& mesh, const Point& center, Threads& threads) {
+    PrimRefs all;
+    all.refs = LargeArray<PrimRef>(mesh.face_count);
+    const std::size_t chunks = (mesh.face_count + chunk_size - 1) / chunk_size;
+    struct Part {
+        std::size_t count = 0;
+        Box box, centroids;
+    };
+    std::vector<Part> parts(chunks);
+    parallel_chunks_apart(mesh.face_count, chunk_size, threads, [&](std::size_t begin, std::size_t end) {
+        PrimRef* to = all.refs.data() + begin;
+        Part part;
+        for (std::size_t face = begin; face < end; ++face) {
+            Box box;
+            if (!box_triangle(mesh, center, face, box)) continue;
+            part.box.grow(box);
+            part.centroids.grow(box.lo + box.hi);
+            PrimRef ref = {box.lo, box.hi};
+            ref.lo[3] = std::bit_cast<float>(static_cast<std::uint32_t>(face));
+            *to++ = ref;
+        }
+        part.count = static_cast<std::size_t>(to - (all.refs.data() + begin));
+        parts[begin / chunk_size] = part;
+    });
+    std::size_t count = 0;  // close the gaps that left-out triangles made; usually there is none and nothing moves
+    for (std::size_t i = 0; i < chunks; ++i) {
+        const PrimRef* from = all.refs.data() + i * chunk_size;
+        if (count != i * chunk_size) std::copy(from, from + parts[i].count, all.refs.data() + count);
+        count += parts[i].count;
+        all.box.grow(parts[i].box);
+        all.centroids.grow(parts[i].centroids);
+    }
+    all.count = static_cast<std::uint32_t>(count);
+    return all;
+}
+
+template PrimRefs make_prim_refs(const Mesh<float>&, const Point&, Threads&);
+template PrimRefs make_prim_refs(const Mesh<double>&, const Point&, Threads&);
+
+}  // namespace wive

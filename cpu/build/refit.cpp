@@ -1,0 +1,164 @@
+// The same tree over moved vertices: boxes and triangles from the leaves up, children and orders as they were.
+#include <algorithm>
+#include <atomic>
+#include <cstring>
+#include <utility>
+#include <vector>
+
+#include "build/builder.h"
+#include "core/parallel.h"
+#include "traverse/slabs.h"
+#include "build/write_node.h"
+
+namespace wive {
+namespace {
+
+constexpr std::size_t task_count = 256;  // subtrees to hand out, whatever the threads
+constexpr std::size_t chunk_size = 1 << 12;
+
+// Boxes of every lane as box_triangle has them; how nodes store them comes after.
+template <class Real>
+class BoxFitter {
+    using Block = TriangleBlockOf<Real>;
+    using Form = Float32Form<Real>;
+
+public:
+    BoxFitter(const BvhView& from, std::size_t node_count, std::byte* to, const Mesh<Real>& mesh, const Point& center,
+              Accuracy accuracy)
+        : from_(from), to_(to), mesh_(mesh), center_(center), accuracy_(accuracy), boxes_(node_width * node_count) {}
+
+    // Also writes the leaves.
+    void fit(Threads& threads) {
+        std::vector<std::uint32_t> nodes = {inner_child(0)};  // breadth first; those before `top` wait for the others
+        std::size_t top = 0;
+        for (; top < nodes.size() && nodes.size() - top < task_count; ++top)
+            for (const std::uint32_t child : from_.template node<Form>(nodes[top]).child)
+                if (child != unused && is_inner(child)) nodes.push_back(child);
+        std::vector<std::size_t> counts(nodes.size());
+        parallel_for(nodes.size() - top, threads, [&](std::size_t i) { fit_subtree(nodes[top + i], counts[top + i]); });
+        for (std::size_t i = top; i-- > 0;) fit_node(nodes[i], counts[i], [&](std::uint32_t child) { return box_of(child); });
+        for (const std::size_t count : counts) triangle_count_ += count;
+    }
+
+    const Box* boxes(std::size_t node) const { return boxes_.data() + node_width * node; }
+    Box all() const { return box_of(inner_child(0)); }
+    std::size_t triangle_count() const { return triangle_count_; }
+
+private:
+    static constexpr std::uint32_t unused = inner_child(0);  // the root is no one's child
+
+    static std::size_t index_of(std::uint32_t child) { return child_offset(child) / sizeof(Node); }
+
+    Box box_of(std::uint32_t node) const {
+        Box all;
+        for (int lane = 0; lane < node_width; ++lane) all.grow(boxes(index_of(node))[lane]);
+        return all;
+    }
+
+    template <class BoxOfInner>
+    void fit_node(std::uint32_t node, std::size_t& count, const BoxOfInner& box_of_inner) {
+        const Node& old = from_.template node<Form>(node);
+        Box* boxes = boxes_.data() + node_width * index_of(node);
+        for (int lane = 0; lane < node_width; ++lane) {
+            const std::uint32_t child = old.child[lane];
+            if (!is_inner(child))
+                boxes[lane] = fit_leaf(child, count);
+            else
+                boxes[lane] = child == unused ? Box{} : box_of_inner(child);
+        }
+    }
+
+    Box fit_subtree(std::uint32_t node, std::size_t& count) {
+        fit_node(node, count, [&](std::uint32_t child) { return fit_subtree(child, count); });
+        return box_of(node);
+    }
+
+    // Triangles that have lost their area leave the leaf.
+    Box fit_leaf(std::uint32_t leaf, std::size_t& count) {
+        const Block* old = from_.template leaf<Form>(leaf);
+        Block* block = reinterpret_cast<Block*>(to_ + child_offset(leaf));
+        Box all;
+        for (std::uint32_t i = 0; i < leaf_block_count(leaf); ++i) {
+            clear_block(block[i]);
+            for (std::uint32_t lane = 0; lane < block_width; ++lane) {
+                Box box;
+                if (old[i].prim[lane] < 0) continue;
+                const std::uint32_t prim = static_cast<std::uint32_t>(old[i].prim[lane]);
+                if (!box_triangle(mesh_, center_, prim, box)) continue;
+                write_triangle(block[i], lane, mesh_, prim, accuracy_);
+                all.grow(box);
+                ++count;
+            }
+        }
+        return all;
+    }
+
+    const BvhView& from_;
+    std::byte* to_;
+    const Mesh<Real>& mesh_;
+    const Point& center_;
+    Accuracy accuracy_;
+    LargeArray<Box> boxes_;
+    std::size_t triangle_count_ = 0;
+};
+
+template <class Real>
+std::span<const TriangleBlockOf<Real>> blocks_of(const Bvh& bvh) {
+    using Block = TriangleBlockOf<Real>;
+    const std::span<const std::byte> bytes = bvh.blocks();
+    return {reinterpret_cast<const Block*>(bytes.data()), bytes.size() / sizeof(Block)};
+}
+
+// Whether a triangle that is in no leaf has an area.
+template <class Real>
+bool is_one_missing(std::span<const TriangleBlockOf<Real>> blocks, const Mesh<Real>& mesh, Threads& threads) {
+    std::vector<char> present(mesh.face_count);
+    for (const auto& block : blocks)
+        for (const std::int32_t prim : block.prim)
+            if (prim >= 0) present[static_cast<std::size_t>(prim)] = 1;
+    std::atomic<bool> missing = false;
+    parallel_chunks(mesh.face_count, chunk_size, threads, [&](std::size_t begin, std::size_t end) {
+        Box box;
+        for (std::size_t i = begin; i < end; ++i)
+            if (!present[i] && box_triangle(mesh, {}, i, box)) missing = true;
+    });
+    return missing;
+}
+
+}  // namespace
+
+template <class Real>
+std::unique_ptr<Bvh> Bvh::refitted(const Mesh<Real>& mesh, unsigned asked_threads) const {
+    if (form_ != NodeForm::float32) return nullptr;
+    Threads threads(thread_count(asked_threads));
+    check_mesh(mesh, threads);
+    if (triangle_count_ < mesh.face_count && is_one_missing(blocks_of<Real>(*this), mesh, threads)) return nullptr;
+    std::unique_ptr<Bvh> bvh(new Bvh);
+    bvh->units_ = LargeArray<std::byte>(units_.size());
+    bvh->node_count_ = node_count_;
+    bvh->accuracy_ = accuracy_;
+    bvh->precision_ = precision_;
+    bvh->depth_ = depth_;
+    const BvhView from = view();
+    if constexpr (precision_of<Real> == Precision::float64) bvh->set_bounds(find_bounds(mesh, threads));
+    BoxFitter<Real> fitter(from, node_count_, bvh->units_.data(), mesh, bvh->center_, accuracy_);
+    fitter.fit(threads);
+    bvh->triangle_count_ = fitter.triangle_count();
+    const Point still_to_center = bvh->settle(fitter.all());
+    const Node* old_nodes = reinterpret_cast<const Node*>(units_.data());
+    Node* to = reinterpret_cast<Node*>(bvh->units_.data());
+    parallel_chunks(node_count_, chunk_size, threads, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i < end; ++i) {
+            const Node& old = old_nodes[i];
+            for (int lane = 0; lane < node_width; ++lane) write_box(to[i], lane, fitter.boxes(i)[lane], still_to_center);
+            std::memcpy(to[i].child, old.child, sizeof old.child);
+            std::memcpy(to[i].order, old.order, sizeof old.order);
+        }
+    });
+    return bvh;
+}
+
+template std::unique_ptr<Bvh> Bvh::refitted(const Mesh<float>&, unsigned) const;
+template std::unique_ptr<Bvh> Bvh::refitted(const Mesh<double>&, unsigned) const;
+
+}  // namespace wive

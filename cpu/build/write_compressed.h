@@ -1,0 +1,36 @@
+// Writing compressed nodes and blocks.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include "core/compressed.h"
+#include "build/emit.h"
+#include "core/layout.h"
+#include "build/mesh.h"
+#include "build/write_float32.h"
+
+namespace wive {
+
+struct CompressedWriter {
+    using Node = CompressedNode;
+    using Block = CompressedBlock;
+
+    // Every box of `out` holds that of `node`, in exact arithmetic. children: how many lanes are used.
+    static void write_node(const wive::Node& node, int children, Node& out);
+    static LeafSize leaf_size(const Mesh<float>& mesh, std::span<const std::uint32_t> prims);
+    // The same for both accuracies.
+    static LeafSize write_leaf(const Mesh<float>& mesh, Accuracy, std::span<const std::uint32_t> prims, std::byte* out);
+};
+
+// Compressed nodes over blocks of doubles.
+struct CompressedFloat64Writer : Float32Writer<double> {
+    using Node = CompressedNode;
+
+    static void write_node(const wive::Node& node, int children, Node& out) {
+        CompressedWriter::write_node(node, children, out);
+    }
+};
+
+}  // namespace wive

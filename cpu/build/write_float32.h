@@ -1,0 +1,29 @@
+// Writing uncompressed nodes and blocks, and blocks of doubles, which are never compressed.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include "build/binary_tree.h"
+#include "build/builder.h"
+#include "build/emit.h"
+#include "core/layout.h"
+#include "build/mesh.h"
+
+namespace wive {
+
+template <class Real>
+struct Float32Writer {
+    using Node = wive::Node;
+    using Block = TriangleBlockOf<Real>;
+
+    static void write_node(const wive::Node& node, int, Node& out) { out = node; }
+    static constexpr std::size_t leaf_units(std::uint32_t triangles) {
+        return blocks_for(triangles) * Block::units();
+    }
+    static LeafSize write_leaf(const Mesh<Real>& mesh, Accuracy accuracy, std::span<const std::uint32_t> prims,
+                               std::byte* out);
+};
+
+}  // namespace wive

@@ -1,0 +1,55 @@
+// How boxes and triangles are stored in a tree: used when it is built and when it is refitted.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstring>
+#include <limits>
+
+#include "core/box.h"
+#include "core/layout.h"
+#include "build/mesh.h"
+#include "core/planes.h"
+
+namespace wive {
+
+// Larger than any plane with its slack, small enough that no arithmetic on it overflows.
+inline constexpr float empty_plane = 1e24f;
+
+// A child's box; an empty one becomes a box that nothing hits.
+inline void write_box(Node& node, int lane, const Box& box, const std::array<float, 3>& center) {
+    const bool empty = !(box.lo[0] <= box.hi[0]);
+    for (int axis = 0; axis < 3; ++axis) {
+        const float c = center[static_cast<std::size_t>(axis)];
+        node.planes[2 * axis][lane] = empty ? empty_plane : plane_below(box.lo[axis], c);
+        node.planes[2 * axis + 1][lane] = empty ? -empty_plane : plane_above(box.hi[axis], c);
+    }
+}
+
+// Bytes behind a block's last row.
+template <class Real>
+inline constexpr std::size_t block_padding = sizeof(TriangleBlockOf<Real>) - sizeof TriangleBlockOf<Real>::rows - sizeof TriangleBlockOf<Real>::prim;
+
+template <class Real>
+void clear_block(TriangleBlockOf<Real>& block) {
+    for (auto& row : block.rows) std::fill(std::begin(row), std::end(row), std::numeric_limits<Real>::quiet_NaN());
+    std::fill(std::begin(block.prim), std::end(block.prim), -1);
+    if constexpr (block_padding<Real> > 0)
+        std::memset(reinterpret_cast<std::byte*>(&block + 1) - block_padding<Real>, 0, block_padding<Real>);
+}
+
+template <class Real>
+void write_triangle(TriangleBlockOf<Real>& block, std::uint32_t lane, const Mesh<Real>& mesh, std::uint32_t prim,
+                    Accuracy accuracy) {
+    const Real* first = mesh.corner(prim, 0);
+    for (int k = 0; k < 3; ++k) {
+        const Real* corner = mesh.corner(prim, k);
+        const bool edge = accuracy == Accuracy::fast && k > 0;
+        for (int axis = 0; axis < 3; ++axis)
+            block.rows[3 * k + axis][lane] = edge ? corner[axis] - first[axis] : corner[axis];
+    }
+    block.prim[lane] = static_cast<std::int32_t>(prim);
+}
+
+}  // namespace wive

@@ -1,0 +1,17 @@
+// Which of the paper's two forms of the slab test the backend "avx512" uses on this machine.
+#pragma once
+
+#include <string_view>
+
+#include "kernels/kernels.h"
+
+namespace wive {
+
+// "full" or "half": the better one here, decided by the first call. Only for machines that run AVX-512. Throws
+// std::invalid_argument where the environment variable WIVE_AVX512_FORM is set to something unknown.
+std::string_view avx512_form();
+
+// The kernels of that form; of full where half has none (compressed nodes, stats). Null where none is compiled in.
+const KernelTable<float>* avx512_kernels();
+
+}  // namespace wive

@@ -1,0 +1,88 @@
+#include "kernels/dispatch.h"
+
+#include <stdexcept>
+
+#include "kernels/avx512_form.h"
+
+#if defined(__x86_64__)
+#include <cpuid.h>
+#endif
+
+namespace wive {
+namespace {
+
+#if defined(__x86_64__)
+bool has_lzcnt() {  // no name for __builtin_cpu_supports in every compiler; without it lzcnt would run as bsr
+    unsigned a = 0, b = 0, c = 0, d = 0;
+    return __get_cpuid(0x80000001u, &a, &b, &c, &d) != 0 && (c >> 5 & 1u) != 0;
+}
+bool has_avx2() {
+    return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") && __builtin_cpu_supports("bmi") &&
+           __builtin_cpu_supports("bmi2") && __builtin_cpu_supports("popcnt") && has_lzcnt();
+}
+bool has_avx512() {
+    return has_avx2() && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl") &&
+           __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512bw");
+}
+#else
+bool has_avx2() { return false; }
+bool has_avx512() { return false; }
+#endif
+
+struct Entry {
+    std::string_view name;
+    const KernelTable<float>* (*kernels)();  // "avx512" is a choice of two, made by the first query that needs it
+    const KernelTable<double>* (*float64_kernels)();  // null where the name is for comparisons of float32 traversals only
+    bool compiled, runs;
+    std::string_view needs;
+};
+
+// Asked once: every query looks its kernels up, and on a virtual machine one CPUID instruction takes microseconds.
+const std::vector<Entry>& entries() {
+    constexpr std::string_view avx512 = "AVX-512 F, VL, DQ or BW", avx2 = "AVX2, FMA, BMI1, BMI2, LZCNT or POPCNT";
+    static const bool x86_64 = avx512_half_kernels() != nullptr;
+    static const std::vector<Entry> all = {
+        {"avx512", avx512_kernels, avx512_float64_kernels, x86_64, has_avx512(), avx512},
+        {"avx512.full", avx512_full_kernels, avx512_float64_kernels, x86_64, has_avx512(), avx512},
+        {"avx512.half", avx512_half_kernels, nullptr, x86_64, has_avx512(), avx512},
+        {"avx512.distance", avx512_by_distance_kernels, nullptr, x86_64, has_avx512(), avx512},
+        {"avx2", avx2_kernels, avx2_float64_kernels, x86_64, has_avx2(), avx2},
+        {"scalar", scalar_kernels, scalar_float64_kernels, true, true, ""},
+        {"scalar.distance", scalar_by_distance_kernels, nullptr, true, true, ""},
+    };
+    return all;
+}
+
+std::string why_not(const Entry& entry) {
+    if (!entry.compiled) return "this build is for another processor architecture than x86-64";
+    if (!entry.runs) return "this processor lacks " + std::string(entry.needs);
+    return "";
+}
+
+}  // namespace
+
+std::vector<std::pair<std::string, std::string>> list_kernels() {
+    std::vector<std::pair<std::string, std::string>> list;
+    for (const Entry& entry : entries()) list.emplace_back(entry.name, why_not(entry));
+    return list;
+}
+
+template <class Real>
+const KernelTable<Real>& find_kernels(std::string_view name) {
+    for (const Entry& entry : entries()) {
+        if (entry.name != name) continue;
+        if (const std::string reason = why_not(entry); !reason.empty())
+            throw std::invalid_argument("kernel '" + std::string(name) + "' can't run here: " + reason);
+        if constexpr (precision_of<Real> == Precision::float32) return *entry.kernels();
+        else if (entry.float64_kernels != nullptr) return *entry.float64_kernels();
+        else
+            throw std::invalid_argument("kernel '" + std::string(name) +
+                                        "' traces float32 scenes only: give vertices in float32, or use 'avx512', 'avx2' or 'scalar'");
+    }
+    throw std::invalid_argument("unknown kernel '" + std::string(name) + "'");
+}
+
+template const KernelTable<float>& find_kernels(std::string_view);
+template const KernelTable<double>& find_kernels(std::string_view);
+
+}  // namespace wive

@@ -1,0 +1,87 @@
+#include "kernels/gather.h"
+
+#include <algorithm>
+
+#include "core/parallel.h"
+
+namespace wive {
+namespace {
+
+// Rays to a thread at a time when their hits are sorted.
+constexpr std::size_t rays_per_sort = 4096;
+
+template <class Real>
+struct Hit {
+    Real t;
+    std::int32_t prim;
+    Real u, v;
+};
+
+template <class Real>
+bool comes_before(const Hit<Real>& a, const Hit<Real>& b) { return a.t != b.t ? a.t < b.t : a.prim < b.prim; }
+
+// Sorts rows [begin, end), by way of `together`, in which a hit stands in one piece.
+template <class Real>
+void sort_rows(const SortedHits<Real>& hits, std::size_t begin, std::size_t end, std::vector<Hit<Real>>& together) {
+    together.clear();
+    for (std::size_t i = begin; i < end; ++i) together.push_back({hits.t[i], hits.prim[i], hits.uv[2 * i], hits.uv[2 * i + 1]});
+    std::sort(together.begin(), together.end(), comes_before<Real>);
+    for (std::size_t i = begin; i < end; ++i) {
+        const Hit<Real>& hit = together[i - begin];
+        hits.t[i] = hit.t;
+        hits.prim[i] = hit.prim;
+        hits.uv[2 * i] = hit.u;
+        hits.uv[2 * i + 1] = hit.v;
+    }
+}
+
+}  // namespace
+
+template <class Real>
+Gathering<Real>::Gathering(const KernelTable<Real>& table, TraceBatch<Real> kernel, const BvhView& bvh,
+                           const RayBatch<Real>& rays, std::size_t count, std::int32_t* stats, unsigned threads,
+                           unsigned in_flight)
+    : threads_(thread_count(threads)), counts_(count), lists_(worker_count(count, threads)) {
+    HitBatch<Real> hits;
+    hits.count = counts_.data();
+    hits.found = lists_.data();
+    hits.stats = stats;
+    trace(table, kernel, bvh, rays, hits, count, threads, in_flight);
+}
+
+template <class Real>
+void Gathering<Real>::write_offsets(std::int64_t* offsets) const {
+    std::int64_t sum = 0;
+    for (std::size_t i = 0; i < counts_.size(); ++i) {
+        offsets[i] = sum;
+        sum += counts_[i];
+    }
+    offsets[counts_.size()] = sum;
+}
+
+template <class Real>
+void Gathering<Real>::sort_into(const SortedHits<Real>& hits) {
+    Threads threads(threads_);
+    // A ray is traced by one worker, so its hits are in one list and its count has one writer.
+    parallel_for(lists_.size(), threads, [&](std::size_t i) {
+        lists_[i].drain([&](const FoundHit<Real>& hit) {
+            const std::size_t row = static_cast<std::size_t>(hits.offsets[hit.ray] + --counts_[hit.ray]);
+            hits.t[row] = hit.t;
+            hits.prim[row] = hit.prim;
+            hits.uv[2 * row] = hit.u;
+            hits.uv[2 * row + 1] = hit.v;
+        });
+    });
+    parallel_chunks(counts_.size(), rays_per_sort, threads, [&](std::size_t begin, std::size_t end) {
+        std::vector<Hit<Real>> together;
+        for (std::size_t i = begin; i < end; ++i) {
+            const auto first = static_cast<std::size_t>(hits.offsets[i]), last = static_cast<std::size_t>(hits.offsets[i + 1]);
+            if (last - first > 1) sort_rows(hits, first, last, together);
+        }
+    });
+}
+
+template class Gathering<float>;
+template class Gathering<double>;
+
+}  // namespace wive

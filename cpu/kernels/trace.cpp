@@ -1,0 +1,49 @@
+#include "kernels/trace.h"
+
+#include <algorithm>
+
+#include "traverse/hit_list.h"
+#include "core/large_array.h"
+#include "core/parallel.h"
+
+namespace wive {
+namespace {
+
+// Rays to a thread at a time: large enough that handing them out costs nothing, small enough to share well.
+constexpr std::size_t rays_per_run = 1024;
+// Rays in flight where the caller leaves the choice: `python -m bench inflight` measures it.
+constexpr unsigned usual_in_flight = 24;
+// Fewer rays than this are traced one by one: filling and draining the flights would take most of the time.
+constexpr std::size_t fewest_in_flight = 16;
+
+}  // namespace
+
+unsigned worker_count(std::size_t count, unsigned threads) {
+    const std::size_t runs = (count + rays_per_run - 1) / rays_per_run;
+    return runs <= 1 ? 1 : static_cast<unsigned>(std::min<std::size_t>(runs, thread_count(threads)));
+}
+
+template <class Real>
+void trace(const KernelTable<Real>& table, TraceBatch<Real> kernel, const BvhView& bvh, const RayBatch<Real>& rays,
+           const HitBatch<Real>& hits, std::size_t count, unsigned threads, unsigned in_flight) {
+    if (in_flight == 0) in_flight = count < fewest_in_flight ? 1 : usual_in_flight;
+    in_flight = std::min<unsigned>(in_flight, max_in_flight);
+    in_flight = static_cast<unsigned>(std::min<std::size_t>(in_flight, count));
+    std::size_t next = 0;
+    const RaySource source = {&next, count, rays_per_run};
+    const auto work = [&](std::size_t worker) {
+        LargeArray<std::byte> scratch(in_flight > 1 ? in_flight * table.flight_bytes : 0);
+        HitBatch<Real> own = hits;
+        if (own.found) own.found += worker;
+        kernel(bvh, rays, own, source, in_flight, scratch.data());
+    };
+    const unsigned workers = worker_count(count, threads);
+    parallel_for(workers, workers, work);
+}
+
+template void trace(const KernelTable<float>&, TraceBatch<float>, const BvhView&, const RayBatch<float>&,
+                    const HitBatch<float>&, std::size_t, unsigned, unsigned);
+template void trace(const KernelTable<double>&, TraceBatch<double>, const BvhView&, const RayBatch<double>&,
+                    const HitBatch<double>&, std::size_t, unsigned, unsigned);
+
+}  // namespace wive

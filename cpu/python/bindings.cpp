@@ -1,0 +1,197 @@
+// The Python face of the core: the tree and the renderer.
+#include <optional>
+#include <span>
+
+#include "kernels/avx512_form.h"
+#include "python/bindings.h"
+#include "kernels/dispatch.h"
+#include "exact_source.h"
+#include "core/parallel.h"
+#include "render/render.h"
+
+namespace wive {
+namespace {
+
+#if defined(__clang__)
+constexpr const char* compiler_name = "clang " __clang_version__;
+#else
+constexpr const char* compiler_name = "gcc " __VERSION__;
+#endif
+
+Accuracy parse_accuracy(const std::string& name) {
+    if (name == "fast") return Accuracy::fast;
+    if (name == "watertight") return Accuracy::watertight;
+    expect(name == "exact", "accuracy: expected 'fast', 'watertight' or 'exact'");
+    return Accuracy::exact;
+}
+
+const char* accuracy_name(Accuracy accuracy) {
+    return accuracy == Accuracy::fast ? "fast" : accuracy == Accuracy::watertight ? "watertight" : "exact";
+}
+
+NodeForm parse_nodes(const std::string& name) {
+    if (name == "float32") return NodeForm::float32;
+    expect(name == "compressed", "nodes: expected 'float32' or 'compressed'");
+    return NodeForm::compressed;
+}
+
+ChildOrder parse_order(const std::string& name) {
+    if (name == "treelet") return ChildOrder::treelet;
+    if (name == "diagonal") return ChildOrder::diagonal;
+    if (name == "slots") return ChildOrder::slots;
+    expect(name == "none", "order: expected 'treelet', 'diagonal', 'slots' or 'none'");
+    return ChildOrder::none;
+}
+
+Quality parse_quality(const std::string& name) {
+    if (name == "high") return Quality::high;
+    expect(name == "medium", "quality: expected 'medium' or 'high'");
+    return Quality::medium;
+}
+
+template <class Real>
+std::unique_ptr<PyBvh> build(Array<Real> vertices, Array<std::int32_t> faces, const std::string& accuracy,
+                             const std::string& order, unsigned threads, int depth_limit, const std::string& nodes,
+                             const std::string& quality) {
+    const BuildOptions options = {parse_accuracy(accuracy), parse_nodes(nodes), parse_order(order),
+                                  threads,                  depth_limit,        parse_quality(quality)};
+    return std::make_unique<PyBvh>(std::move(vertices), std::move(faces), options);
+}
+
+// Function and context as ctypes gives their addresses.
+ForeignTracer foreign_tracer(const std::optional<std::pair<std::uintptr_t, std::uintptr_t>>& addresses) {
+    if (!addresses) return {};
+    return {reinterpret_cast<ForeignTracer::Function>(addresses->first), reinterpret_cast<const void*>(addresses->second)};
+}
+
+std::uint64_t render(const PyBvh& self, const std::string& kernel, const Array<float>& camera, Array<float> image,
+                     int row_begin, int row_end, int samples, int bounces, const std::string& albedo, std::uint32_t seed,
+                     unsigned threads, unsigned in_flight,
+                     std::optional<std::pair<std::uintptr_t, std::uintptr_t>> tracer) {
+    expect(self.bvh().precision() == Precision::float32, "render: expected a float32 scene, got float64");
+    expect(camera.ndim() == 2 && camera.shape(0) == 4 && camera.shape(1) == 3, "camera: expected shape (4, 3)");
+    expect(image.ndim() == 3 && image.shape(2) == 3, "image: expected shape (height, width, 3)");
+    expect(0 <= row_begin && row_begin <= row_end && row_end <= image.shape(0), "rows: expected a range within the image");
+    expect(samples > 0 && bounces >= 0, "samples, bounces: expected at least 1 and 0");
+    expect(albedo == "gray" || albedo == "normals", "albedo: expected 'gray' or 'normals'");
+    const auto row = [&](py::ssize_t i) { return load_vec3(camera.data(i, 0)); };
+    const RenderJob job = {self.bvh().view(),
+                           self.mesh<float>(),
+                           find_kernels<float>(kernel),
+                           self.bvh().accuracy(),
+                           self.bvh().node_form(),
+                           {row(0), row(1), row(2), row(3)},
+                           static_cast<int>(image.shape(1)),
+                           static_cast<int>(image.shape(0)),
+                           samples,
+                           bounces,
+                           albedo == "normals" ? Albedo::normals : Albedo::gray,
+                           seed,
+                           image.mutable_data(),
+                           in_flight,
+                           foreign_tracer(tracer)};
+    py::gil_scoped_release release;
+    Threads checkers(thread_count(threads));
+    check_mesh(job.mesh, checkers);  // its arrays are the caller's, who may have changed them since
+    return render_rows(job, row_begin, row_end, thread_count(threads));
+}
+
+// A read-only array over memory that `owner` keeps alive.
+template <class T>
+py::array_t<T> view(py::handle owner, std::vector<py::ssize_t> shape, const T* data) {
+    py::array_t<T> array(std::move(shape), data, owner);
+    array.attr("setflags")(py::arg("write") = false);
+    return array;
+}
+
+// Nodes or blocks as words, in rows of so many.
+py::array_t<std::uint32_t> rows(py::handle owner, std::span<const std::byte> data, std::size_t each, std::size_t columns) {
+    return view(owner,
+                {static_cast<py::ssize_t>(data.size() / each), static_cast<py::ssize_t>(each / 4 / columns),
+                 static_cast<py::ssize_t>(columns)},
+                reinterpret_cast<const std::uint32_t*>(data.data()));
+}
+
+template <std::size_t n>
+py::array_t<float> copy(const std::array<float, n>& values) {
+    return py::array_t<float>(static_cast<py::ssize_t>(n), values.data());
+}
+
+}  // namespace
+}  // namespace wive
+
+PYBIND11_MODULE(_cpu, m, pybind11::mod_gil_not_used()) {
+    using namespace wive;
+    m.doc() = "The compiled core of wive.";
+    m.attr("compiler") = compiler_name;
+    m.attr("exact_source") = exact_source;
+    m.def("kernels", [] {
+        py::dict names;
+        for (const auto& [name, reason] : list_kernels()) names[py::str(name)] = reason;
+        return names;
+    });
+    m.def("avx512_form", [] {
+        find_kernels<float>("avx512.full");  // throws where they can't run
+        return avx512_form();
+    });
+    PyBvhClass bvh(m, "Bvh");
+    for_each_precision([&]<class Real>(Real) {
+        bvh.def(py::init(&build<Real>), array_arg("vertices"), array_arg("faces"), py::arg("accuracy") = "watertight",
+                py::arg("order") = "treelet", py::arg("threads") = 0, py::arg("depth_limit") = max_depth,
+                py::arg("nodes") = "float32", py::arg("quality") = "medium");
+        bvh.def("refitted", [](const PyBvh& self, const Array<Real>& vertices, unsigned threads) {
+            return std::make_unique<PyBvh>(self, vertices, threads);
+        }, array_arg("vertices"), py::arg("threads") = 0);
+    });
+    bvh.def_property_readonly("vertices", &PyBvh::vertices)
+        .def_property_readonly("precision", [](const PyBvh& self) {
+            return self.bvh().precision() == Precision::float32 ? "float32" : "float64";
+        })
+        .def_property_readonly("nodes", [](py::object self) {
+            const Bvh& bvh = self.cast<const PyBvh&>().bvh();
+            return rows(self, bvh.nodes(), bvh.node_bytes(), 8);
+        })
+        .def_property_readonly("blocks", [](py::object self) {
+            const Bvh& bvh = self.cast<const PyBvh&>().bvh();
+            if (bvh.precision() == Precision::float64) return rows(self, bvh.blocks(), sizeof(TriangleBlockOf<double>), 4);
+            if (bvh.node_form() == NodeForm::compressed) return rows(self, bvh.blocks(), unit_bytes, 8);
+            return rows(self, bvh.blocks(), sizeof(TriangleBlock), 4);
+        })
+        .def_property_readonly("units", [](py::object self) {
+            const Bvh& bvh = self.cast<const PyBvh&>().bvh();
+            return view(self, {static_cast<py::ssize_t>(bvh.bytes() / unit_bytes), 8},
+                        reinterpret_cast<const std::uint32_t*>(bvh.view().units));
+        })
+        .def_property_readonly("center", [](const PyBvh& self) {
+            const BvhView v = self.bvh().view();
+            return copy(std::array{v.center[0], v.center[1], v.center[2]});
+        })
+        .def_property_readonly("extent", [](const PyBvh& self) {
+            const BvhView v = self.bvh().view();
+            return copy(std::array{v.extent[0], v.extent[1], v.extent[2]});
+        })
+        .def_property_readonly("bounds", [](const PyBvh& self) -> py::array {
+            const py::array_t<double> bounds({2, 3}, self.bvh().bounds()[0].data());
+            if (self.bvh().precision() == Precision::float64) return bounds;
+            return py::array_t<float>(bounds);
+        })
+        .def_property_readonly("accuracy", [](const PyBvh& self) {
+            return accuracy_name(self.bvh().accuracy());
+        })
+        .def_property_readonly("node_form", [](const PyBvh& self) {
+            return self.bvh().node_form() == NodeForm::float32 ? "float32" : "compressed";
+        })
+        .def_property_readonly("depth", [](const PyBvh& self) { return self.bvh().depth(); })
+        .def_property_readonly("memory", [](const PyBvh& self) {
+            return self.bvh().bytes();
+        })
+        .def_property_readonly("sah", [](const PyBvh& self) {
+            const Bvh::Sah sah = self.bvh().sah();
+            return py::make_tuple(sah.nodes, sah.blocks);
+        })
+        .def("render_rows", &render, py::arg("kernel"), array_arg("camera"), array_arg("image"), py::arg("row_begin"),
+             py::arg("row_end"), py::arg("samples"), py::arg("bounces"), py::arg("albedo"), py::arg("seed") = 0,
+             py::arg("threads") = 0, py::arg("in_flight") = 0, py::arg("tracer") = py::none());
+    bind_queries(bvh);
+    bind_surface(m);
+}

@@ -1,0 +1,98 @@
+// What the files of bindings share: arguments are checked in Python (wive/scene.py); here only what memory safety needs.
+#pragma once
+
+#include <pybind11/numpy.h>
+#include <pybind11/pybind11.h>
+#include <pybind11/stl.h>
+
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <variant>
+
+#include "build/builder.h"
+
+namespace wive {
+
+namespace py = pybind11;
+
+template <class T>
+using Array = py::array_t<T, py::array::c_style>;
+
+// An argument that must have the dtype and the layout already.
+inline py::arg array_arg(const char* name) { return py::arg(name).noconvert(); }
+
+inline void expect(bool condition, const char* message) {
+    if (!condition) throw std::invalid_argument(message);
+}
+
+template <class T>
+void expect_shape(const Array<T>& array, py::ssize_t columns, const char* message) {
+    expect(array.ndim() == 2 && array.shape(1) == columns, message);
+}
+
+// The tree together with the arrays it was built from, which rendering reads.
+class PyBvh {
+public:
+    template <class Real>
+    PyBvh(Array<Real> vertices, Array<std::int32_t> faces, const BuildOptions& options)
+        : vertices_(std::move(vertices)), faces_(std::move(faces)), options_(options) {
+        expect_shape(std::get<Array<Real>>(vertices_), 3, "vertices: expected shape (v, 3)");
+        expect_shape(faces_, 3, "faces: expected shape (f, 3)");
+        expect(options.depth_limit >= 1 && options.depth_limit <= max_depth, "depth_limit: expected 1 to 64");
+        const Mesh view = mesh<Real>();
+        py::gil_scoped_release release;
+        bvh_ = std::make_unique<Bvh>(view, options_);
+    }
+
+    // The same faces over moved vertices. Where the tree can't be kept it is built anew.
+    template <class Real>
+    PyBvh(const PyBvh& other, Array<Real> vertices, unsigned threads)
+        : vertices_(std::move(vertices)), faces_(other.faces_), options_(other.options_) {
+        other.expect_precision<Real>();
+        expect_shape(std::get<Array<Real>>(vertices_), 3, "vertices: expected shape (v, 3)");
+        options_.threads = threads;
+        const Mesh view = mesh<Real>();
+        py::gil_scoped_release release;
+        bvh_ = other.bvh_->refitted(view, threads);
+        if (!bvh_) bvh_ = std::make_unique<Bvh>(view, options_);
+    }
+
+    const Bvh& bvh() const { return *bvh_; }
+    const std::variant<Array<float>, Array<double>>& vertices() const { return vertices_; }
+    template <class Real>
+    Mesh<Real> mesh() const {
+        const auto& vertices = std::get<Array<Real>>(vertices_);
+        return {vertices.data(), static_cast<std::size_t>(vertices.shape(0)), faces_.data(),
+                static_cast<std::size_t>(faces_.shape(0))};
+    }
+    // That arrays of Real are what this tree takes.
+    template <class Real>
+    void expect_precision() const {
+        expect(std::holds_alternative<Array<Real>>(vertices_),
+               precision_of<Real> == Precision::float32 ? "expected arrays in float64, as the vertices are, got float32"
+                                                        : "expected arrays in float32, as the vertices are, got float64");
+    }
+
+private:
+    std::variant<Array<float>, Array<double>> vertices_;
+    Array<std::int32_t> faces_;
+    BuildOptions options_;
+    std::unique_ptr<Bvh> bvh_;
+};
+
+// Defines the same for either precision: define(Real{}). Python picks by dtype, and float32 is asked first.
+template <class Define>
+void for_each_precision(const Define& define) {
+    define(float{});
+    define(double{});
+}
+
+using PyBvhClass = py::class_<PyBvh>;
+
+// Queries of rays, in bindings_queries.cpp; points and normals of hits, in bindings_surface.cpp.
+void bind_queries(PyBvhClass& bvh);
+void bind_surface(py::module_& m);
+
+}  // namespace wive

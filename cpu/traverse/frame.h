@@ -1,0 +1,119 @@
+// A ray made ready for traversal: checked, scaled, and its reciprocal and slab offsets taken once.
+#pragma once
+
+#include <bit>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <type_traits>
+
+#include "core/interval.h"
+#include "core/layout.h"
+#include "core/ray.h"
+
+namespace wive {
+
+// The direction is scaled by a power of two so that its largest component lies in [1, 2); t scales with it, and
+// both scalings are exact. Everything below is in these scaled units until a hit is written.
+//
+// Slabs are conservative at no cost to the loop. With planes p and origin o relative to the tree's centre, the
+// distance to a plane is computed as fma(p, r, bias), r = 1/d and bias = -o r -+ slack, where, in the roundoff
+// u = 2^-24, P the tree's extent and O = |o| on that axis, the errors add up, as lengths along the axis, to
+//     2u(P + O)  from r and from o r,      u(2P + 2O)  from rounding bias and result,
+//     u O        from o = origin - centre, u P         where there is no fused multiply-add,
+// and the triangle test (triangle_watertight.h) moves a vertex sideways by at most 6u max(P + O). All of it is
+// below 12u M, M = max over the axes of (P + O); slack = |r| 16u M covers it. The near distance is lowered and the far
+// distance raised by it, so no box that holds a triangle the test accepts is ever missed.
+// Compressed planes (compressed_slabs.h) are met at fma(byte, step r, fma(origin, r, bias)). step r is exact, the step
+// being a power of two far from underflow; rounding the inner sum adds u(P + O), and the product of the byte 2u P where
+// there is no fused multiply-add. Such planes may lie up to a step outside, which is below P / 60: 15u M in all.
+// A float64 ray meets the same boxes, all of this in float: its direction is rounded, which adds u(P + O) from r; o = origin -
+// centre is taken in double, so that its one rounding to float is the u O above. The triangle tests move vertices sideways
+// by multiples of 2^-53 M; where the weights of a hit have so little to say that they would move it by more, they are taken
+// exactly (triangle_watertight_float64.h), so that a hit lies no more than 3u M aside: 13u M in all with compressed planes.
+// A component smaller than 2^-30 of the longest counts as that, with its sign: along the ray that moves a point by
+// less than 2^-29 M, which the same slack covers. (A subnormal direction stays shorter than 1 when scaled.)
+// Real, of Isa: the caller's numbers, and those of the triangle test.
+template <class Isa>
+struct RayFrame {
+    using Real = typename Isa::Real;
+    using Real4 = typename Isa::Real4;
+    using Float4 = typename Isa::Float4;
+
+    // Three values each; the fourth lane only makes them whole registers.
+    alignas(4 * sizeof(Real)) Real origin[4];
+    alignas(4 * sizeof(Real)) Real direction[4];
+    alignas(16) float rdir[4];
+    alignas(16) float near_bias[4];
+    alignas(16) float far_bias[4];
+    Interval<Real> interval;
+    Real scale;  // t of the caller's ray = scale * t here
+    std::uint32_t near_row[3], far_row[3];  // in planes from a node's first one: the rows that the ray meets first and last
+    std::uint32_t order_shift;  // of a node's order, four bits a sequence: the octant's, from back to front
+    unsigned longest_axis;
+
+    // False where the ray hits nothing by rule: an origin or a direction that is no number or out of range, a
+    // direction of length zero, an empty interval.
+    [[gnu::always_inline]] bool load(const BvhView& bvh, const RayBatch<Real>& rays, std::size_t i) {
+        const Real *o = rays.origins + 3 * i, *d = rays.directions + 3 * i;
+        const Real4 caller_origin = Real4::set(o[0], o[1], o[2], 0), caller_direction = Real4::set(d[0], d[1], d[2], 0);
+        const Real caller_tmin = rays.tmin[i * rays.tmin_stride], caller_tmax = rays.tmax[i * rays.tmax_stride];
+
+        const Real4 lengths = abs(caller_direction);
+        const unsigned in_range = less_equal(abs(caller_origin), Real4::all(max_coordinate<Real>)) &
+                                  less_equal(lengths, Real4::all(std::numeric_limits<Real>::max()));
+        const Real longest = highest_lane(lengths);
+        if ((in_range != 15u) | (longest == 0) | !(caller_tmin <= caller_tmax)) [[unlikely]] return false;
+
+        using Bits = std::conditional_t<sizeof(Real) == sizeof(float), std::uint32_t, std::uint64_t>;
+        constexpr int mantissa = std::numeric_limits<Real>::digits - 1;
+        constexpr Bits one = std::bit_cast<Bits>(Real{1}) >> mantissa;  // the exponent field of 1
+        Bits exponent = std::bit_cast<Bits>(longest) >> mantissa;
+        exponent = exponent > 2 * one - 1 ? 2 * one - 1 : exponent;
+        scale = std::bit_cast<Real>((2 * one - exponent) << mantissa);
+        const Real unscale = std::bit_cast<Real>(exponent > 0 ? exponent << mantissa : Bits{1} << (mantissa - 1));
+        interval = Interval<Real>::of(caller_tmin * unscale, caller_tmax * unscale);
+
+        constexpr float smallest_part = 0x1p-30f, slack_factor = 0x1p-20f;
+        constexpr float least_reach = 0x1p-100f;  // keeps the slack from vanishing where everything is tiny
+        const Real4 scaled_direction = caller_direction * Real4::all(scale);
+        const Float4 scaled = Float4::narrow(scaled_direction);  // signs stay, also where a component becomes zero
+        const Float4 relative = Float4::narrow(caller_origin - Real4::of(Float4::load(bvh.center)));
+        const float reach = highest_lane(Float4::load(bvh.extent) + abs(relative)) + least_reach;
+        const float smallest = static_cast<float>(longest * scale) * smallest_part;
+        const Float4 size = Float4::all(1.0f) / max(abs(scaled), Float4::all(smallest));
+        const Float4 reciprocal = flip_sign(size, scaled);
+        const Float4 distance = relative * reciprocal, slack = size * Float4::all(reach * slack_factor);
+        const unsigned octant = sign_bits(scaled) & 7u;  // bit a: negative on axis a, from the sign of the reciprocal
+        order_shift = 4 * (7 - octant);  // the stack wants the farthest child first, and octant 7 - o is octant o backwards
+        longest_axis = static_cast<unsigned>(std::countr_zero(less_equal(Real4::all(longest), lengths)));
+        for (unsigned axis = 0; axis < 3; ++axis) {
+            near_row[axis] = node_width * (2 * axis + (octant >> axis & 1u));
+            far_row[axis] = near_row[axis] ^ node_width;
+        }
+        caller_origin.store(origin);
+        scaled_direction.store(direction);
+        reciprocal.store(rdir);
+        (Float4::all(0.0f) - (distance + slack)).store(near_bias);
+        (slack - distance).store(far_bias);
+        return true;
+    }
+};
+
+// With the axes of a space in which the ray runs along the third, the longest of its direction.
+template <class Isa>
+struct AxisFrame : RayFrame<Isa> {
+    std::uint32_t axis[3];
+
+    [[gnu::always_inline]] bool load(const BvhView& bvh, const RayBatch<typename Isa::Real>& rays, std::size_t i) {
+        if (!RayFrame<Isa>::load(bvh, rays, i)) [[unlikely]] return false;
+        constexpr unsigned following = 0b001001;  // the axis after axis i, two bits each
+        axis[2] = this->longest_axis;
+        axis[0] = following >> 2 * axis[2] & 3u;
+        axis[1] = following >> 2 * axis[0] & 3u;
+        return true;
+    }
+};
+
+}  // namespace wive

@@ -1,0 +1,58 @@
+// The closest hit in exact mode.
+#pragma once
+
+#include "traverse/exact_hit.h"
+#include "core/layout.h"
+#include "traverse/query.h"
+
+namespace wive {
+
+// Every hit is offered with its t as the caller counts it, the nearest float to the exact value. Rounding keeps the
+// order of what it does not make equal; what it does is compared exactly, so the best hit's triangle is remembered.
+template <class Block>
+struct ExactClosestHit {
+    using InFlight = ExactClosestHit;
+    static constexpr bool in_order = true;
+    static constexpr bool crossings = false;
+    static constexpr bool wants_uv = true;
+
+    Interval<float> interval{};  // for the boxes, in the frame's units; ends at the best hit
+    HitNumbers best{std::numeric_limits<float>::infinity(), 0, 0};
+    std::uint32_t prim = no_prim;
+    const Block* block = nullptr;
+    int lane = 0;
+
+    // compare(block, lane): the sign of the exact t offered less that of another triangle. unscale: t in the
+    // frame's units over the caller's.
+    template <class Compare>
+    [[gnu::always_inline]] bool take(const HitNumbers& hit, const Block& hit_block, int hit_lane, float unscale,
+                                     const Compare& compare) {
+        const auto hit_prim = static_cast<std::uint32_t>(hit_block.prim_at(hit_lane));
+        if (prim != no_prim) {
+            if (hit.t > best.t) return false;
+            if (hit.t == best.t) [[unlikely]] {
+                const int order = compare(*block, lane);
+                if (order > 0 || (order == 0 && hit_prim > prim)) return false;
+            }
+        }
+        best = hit;
+        prim = hit_prim;
+        block = &hit_block;
+        lane = hit_lane;
+        // Boxes are lowered by more than t was rounded (frame.h), except where t is a subnormal number.
+        interval.end_at((hit.t + 0x1p-148f) * unscale);
+        return false;
+    }
+    [[gnu::always_inline]] void write(const HitBatch<float>& hits, std::size_t i, float) const {
+        const bool hit = prim != no_prim;
+        constexpr float nan = std::numeric_limits<float>::quiet_NaN();
+        hits.t[i] = hit ? best.t : std::numeric_limits<float>::infinity();
+        hits.prim[i] = static_cast<std::int32_t>(prim);
+        if (hits.uv) {
+            hits.uv[2 * i] = hit ? best.u : nan;
+            hits.uv[2 * i + 1] = hit ? best.v : nan;
+        }
+    }
+};
+
+}  // namespace wive

@@ -1,0 +1,241 @@
+"""Rays from `Hits.spawn` don't hit the triangle they leave: any size, place, side and direction."""
+
+import re
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from support.meshes import TRIANGLE, sphere
+from test_error_bound import aimed, crossed, fractions
+
+import wive
+from wive._internal import spawn
+
+ACCURACIES = ("fast", "watertight", "exact")
+UTM = np.array([148376.0, 1234.0, -223423.0])
+COUNT = 200
+
+# Magnitude of coordinates, size of triangles, and how far off the middle of an edge the third corner is.
+EXPONENTS = [(10.0**e, 10.0**e, 1.0) for e in range(-6, 7)]
+TRANSLATED = [(10.0**e, 10.0 ** (e - shift), 1.0) for e in (-5, 0, 6) for shift in (1, 2, 4)]
+SLIVERS = [(1.0, 1.0, 1e-3), (1.0, 1.0, 1e-4), (100.0, 1.0, 1e-3)]
+
+
+def triangles(magnitude: float, size: float, width: float, seed: int = 1) -> np.ndarray:
+    """(n,3,3) round a place of that magnitude."""
+    random = np.random.default_rng(seed)
+    corners = size * random.uniform(0.01, 1, (COUNT, 1, 1)) * random.standard_normal((COUNT, 3, 3))
+    if width < 1:
+        corners[:, 2] = (corners[:, 0] + corners[:, 1]) / 2 + width * corners[:, 2]
+    if size < magnitude:
+        corners += magnitude * random.uniform(0.5, 1, 3) * [1, -1, 1]
+    return corners
+
+
+def hits_of(
+    corners: np.ndarray, accuracy: str, slope: float = 1.0, dtype: type = np.float32
+) -> tuple[wive.Scene, wive.Hits, np.ndarray]:
+    """A scene of these triangles, hits in it that rays were aimed at, and the directions of these rays."""
+    random = np.random.default_rng(2)
+    size = abs(corners - corners.mean(axis=1, keepdims=True)).max(axis=(1, 2))[:, None]
+    direction = random.standard_normal((len(corners), 3))
+    direction -= (1 - slope) * project(direction, corners)
+    vertices, faces, origins, directions = aimed(corners, random, 2 * size, direction, dtype)
+    scene = wive.Scene(vertices, faces, accuracy=accuracy)
+    return scene, scene.intersect(origins, directions), directions
+
+
+def project(directions: np.ndarray, corners: np.ndarray) -> np.ndarray:
+    """Their part along the normals of triangles (n,3,3)."""
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    return (directions * normals).sum(axis=1, keepdims=True) * normals
+
+
+def ways_out(hits: wive.Hits, incoming: np.ndarray, flattest: float = 1e-9) -> np.ndarray:
+    """(k,n,3) directions: straight on, reflected, anywhere on both sides, and at slopes down to that."""
+    random = np.random.default_rng(3)
+    normals = np.where(hits.mask[:, None], hits.normals(), [0, 0, 1])
+    incoming = incoming / np.linalg.norm(incoming, axis=1, keepdims=True)
+    along = 2 * (incoming * normals).sum(axis=1, keepdims=True) * normals
+    anywhere = random.standard_normal((6, len(normals), 3))
+    in_plane = anywhere[:3] - (anywhere[:3] * normals).sum(axis=-1, keepdims=True) * normals
+    slopes = 10 ** random.uniform(np.log10(flattest), -2, (3, len(normals), 1)) * random.choice(
+        [-1, 1], (3, len(normals), 1)
+    )
+    # and along the edges, where the direction is in the plane as well as its dtype can say
+    corners = hits.vertices[hits.faces[np.maximum(hits.prim, 0)]].astype(np.float64)
+    edges = (corners - np.roll(corners, 1, axis=1)).swapaxes(0, 1)
+    edges /= abs(edges).max(axis=-1, keepdims=True)
+    ways = [[incoming, incoming - along, -incoming], anywhere, in_plane + slopes * normals, edges, -edges]
+    return np.concatenate([np.asarray(way) for way in ways]).astype(hits.t.dtype)
+
+
+def own_hits(scene: wive.Scene, hits: wive.Hits, incoming: np.ndarray, flattest: float = 1e-9) -> int:
+    """How many spawned rays meet the triangle that they left."""
+    count = 0
+    for directions in ways_out(hits, incoming, flattest):
+        again = scene.intersect_all(hits.spawn(directions), directions)
+        count += np.count_nonzero(again.prim == hits.prim[again.ray])
+    return count
+
+
+@pytest.mark.parametrize("accuracy", ACCURACIES)
+@pytest.mark.parametrize("shape", EXPONENTS + TRANSLATED + SLIVERS)
+def test_spawned_rays_never_hit_their_own_triangle(shape: tuple[float, float, float], accuracy: str) -> None:
+    # Of rays aimed at slivers from beside, few hit.
+    for slope, hit in ((1.0, COUNT / 2), (1e-4, COUNT / 10)):
+        scene, hits, incoming = hits_of(triangles(*shape), accuracy, slope)
+        assert hits.mask.sum() > hit
+        assert own_hits(scene, hits, incoming) == 0
+
+
+def test_even_needles_keep_the_promise_in_watertight() -> None:
+    for width in (1e-5, 1e-6):
+        scene, hits, incoming = hits_of(triangles(1.0, 1.0, width), "watertight")
+        assert hits.mask.sum() > COUNT / 2
+        assert own_hits(scene, hits, incoming) == 0
+
+
+@pytest.mark.parametrize("accuracy", ["fast", "watertight"])
+def test_a_fiftieth_of_the_offset_is_not_enough(accuracy: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    clearance = spawn.CLEARANCES[accuracy]
+    monkeypatch.setitem(spawn.CLEARANCES, accuracy, lambda *surface: 0.02 * clearance(*surface))
+    assert sum(own_hits(*hits_of(triangles(*shape), accuracy)) for shape in EXPONENTS + SLIVERS) > 0
+
+
+@pytest.mark.parametrize("accuracy", ACCURACIES)
+def test_points_merely_rounded_do_hit_again_so_these_rays_can_tell(accuracy: str) -> None:
+    scene, hits, incoming = hits_of(triangles(1.0, 1.0, 1.0), accuracy)
+    directions = ways_out(hits, incoming)[3]
+    again = scene.intersect_all(hits.points().astype(np.float32), directions)
+    assert (again.prim == hits.prim[again.ray]).sum() > COUNT / 10
+
+
+@pytest.mark.parametrize("accuracy", ACCURACIES)
+@pytest.mark.parametrize("shape", [*EXPONENTS[::4], *TRANSLATED[::3], SLIVERS[1]])
+def test_origins_lie_strictly_on_the_side_of_the_direction(
+    shape: tuple[float, float, float], accuracy: str
+) -> None:
+    _, hits, incoming = hits_of(triangles(*shape), accuracy)
+    found = np.flatnonzero(hits.mask)
+    v0, v1, v2 = fractions(hits.vertices[hits.faces[hits.prim[found]]]).swapaxes(0, 1)
+    normal = crossed(v1 - v0, v2 - v0)
+    for directions in ways_out(hits, incoming)[:5]:
+        above = (normal * (fractions(hits.spawn(directions)[found]) - v0)).sum(axis=1)
+        forward = (normal * fractions(directions[found])).sum(axis=1)
+        assert all(a * f > Fraction(0) for a, f in zip(above, forward, strict=True))
+
+
+@pytest.mark.parametrize("accuracy", ACCURACIES)
+@pytest.mark.parametrize("place", [np.zeros(3), UTM])
+@pytest.mark.parametrize("radius", [1e-6, 1.0, 1e3, 1e6])
+def test_origins_move_by_no_more_than_64_units_in_the_last_place(
+    radius: float, place: np.ndarray, accuracy: str
+) -> None:
+    vertices, faces = sphere(2, radius)
+    vertices = (vertices + radius * place).astype(np.float32)
+    directions = np.random.default_rng(4).standard_normal((2000, 3)).astype(np.float32)
+    scene = wive.Scene(vertices, faces, accuracy=accuracy)
+    hits = scene.intersect((radius * place).astype(np.float32), directions)
+    corners = vertices[faces[hits.prim]].astype(np.float64)
+    size = abs(corners - hits.points()[:, None]).max(axis=(1, 2))
+    coordinate = abs(corners).max(axis=(1, 2))
+    moved = np.linalg.norm(hits.spawn(-directions) - hits.points(), axis=1)
+    assert hits.mask.all()
+    assert (moved <= 64 * np.spacing(np.maximum(size, coordinate).astype(np.float32))).all()
+    if accuracy == "exact":  # a rounding, and what double is unsure of
+        assert (moved <= 2 * np.spacing(coordinate.astype(np.float32))).all()
+
+
+def leave(scene: wive.Scene, origin: np.ndarray, seed: int) -> tuple[np.ndarray, np.ndarray]:
+    """Whether 120,000 rays spawned outwards, a quarter of them grazing, and as many inwards hit anything."""
+    random = np.random.default_rng(seed)
+    hits = scene.intersect(origin.astype(np.float32), random.standard_normal((120_000, 3)).astype(np.float32))
+    normals = hits.normals()
+    assert hits.mask.all()
+    directions = random.standard_normal(normals.shape)
+    directions[::4] -= (1 - 1e-4) * (directions[::4] * normals[::4]).sum(axis=1, keepdims=True) * normals[::4]
+    directions = directions.astype(np.float32)
+    outwards = np.where((directions * normals).sum(axis=1, keepdims=True) < 0, -directions, directions)
+    return scene.occluded(hits.spawn(outwards), outwards), scene.occluded(hits.spawn(-outwards), -outwards)
+
+
+@pytest.mark.parametrize("accuracy", ACCURACIES)
+@pytest.mark.parametrize("radius", [1e-6, 1.0, 1e6])
+def test_a_convex_body_is_left_for_good(radius: float, accuracy: str) -> None:
+    outwards, inwards = leave(wive.Scene(*sphere(5, radius), accuracy=accuracy), np.zeros(3), seed=5)
+    assert not outwards.any()
+    assert inwards.all() or accuracy == "fast"
+
+
+@pytest.mark.parametrize("accuracy", ["watertight", "exact"])
+def test_a_closed_body_far_away_is_not_left_from_inside(accuracy: str) -> None:
+    vertices, faces = sphere(3, 1000.0)
+    vertices = (vertices + UTM).astype(np.float32)
+    _, inwards = leave(wive.Scene(vertices, faces, accuracy=accuracy), UTM, seed=7)
+    assert inwards.all()
+
+
+def tessellated_plane(slope: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
+    """A grid of integer corners in one plane exactly, far from the origin."""
+    steps = np.arange(48)
+    x, y = (axis.ravel() for axis in np.meshgrid(steps * 8, steps * 8, indexing="ij"))
+    z = slope[0] * x + slope[1] * y
+    corner = (steps[:-1, None] * 48 + steps[:-1]).ravel()
+    a, b, c, d = corner, corner + 48, corner + 49, corner + 1
+    faces = np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
+    return (np.stack([x, y, z], axis=1) + UTM.round()).astype(np.float32), faces
+
+
+@pytest.mark.parametrize("accuracy", ["watertight", "exact"])
+@pytest.mark.parametrize("slope", [(0, 0), (1, 2)])
+def test_a_tessellated_plane_far_away_is_left_for_good(slope: tuple[int, int], accuracy: str) -> None:
+    random = np.random.default_rng(6)
+    vertices, faces = tessellated_plane(slope)
+    weights = random.dirichlet(np.ones(3), 20_000)
+    weights[::3] = np.eye(3)[random.integers(3, size=len(weights[::3]))]
+    corners = vertices[faces[random.integers(len(faces), size=20_000)]]
+    targets = np.einsum("nk,nkx->nx", weights, corners.astype(np.float64))
+    origins = (targets + np.array([3, 5, 400])).astype(np.float32)
+    scene = wive.Scene(vertices, faces, accuracy=accuracy)
+    hits = scene.intersect(origins, (targets - origins).astype(np.float32))
+    assert hits.mask.mean() > 0.95  # some are aimed at the border
+    for directions in ways_out(hits, origins.astype(np.float64)):
+        # Neighbours are met by no ray on either side, however flat.
+        assert not scene.occluded(hits.spawn(directions), directions).any()
+
+
+def test_misses_spawn_rays_that_miss() -> None:
+    scene = wive.Scene(*TRIANGLE)
+    hits = scene.intersect([[0.2, 0.2, 0], [5, 5, 0]], [0, 0, 1])
+    origins = hits.spawn([0, 0, -1])
+    assert origins.dtype == np.float32 and origins.shape == (2, 3)
+    assert np.isnan(origins[1]).all() and not np.isnan(origins[0]).any()
+    assert not scene.occluded(origins, [0, 0, -1]).any()
+    assert wive.Scene(*TRIANGLE).intersect(np.zeros((0, 3)), np.zeros((0, 3))).spawn([0, 0, 1]).shape == (
+        0,
+        3,
+    )
+
+
+def test_origins_depend_on_the_side_alone_and_cross_the_surface() -> None:
+    hits = wive.Scene(*TRIANGLE).intersect([[0.2, 0.2, 0]], [0, 0, 1])
+    above, below = hits.spawn([0, 0, 1]), hits.spawn([[0, 0, -1]])
+    assert above[0, 2] > 1 > below[0, 2]
+    np.testing.assert_array_equal(above, hits.spawn([[5, 5, 1e-3]]))
+    np.testing.assert_array_equal(above, hits.spawn(np.array([[5, -5, 0]], np.float64)))  # in the plane
+
+
+@pytest.mark.parametrize(
+    ("directions", "error", "text"),
+    [
+        (np.zeros((3, 3)), ValueError, "have shape (2, 3), one a hit, or (3,), got (3, 3)"),
+        (np.zeros(2), ValueError, "have shape (n, 3), or (3,) if all rays share it, got (2,)"),
+        (["up"], TypeError, "be an (n, 3) array of real numbers, got dtype <U2: convert it first"),
+    ],
+)
+def test_bad_directions_are_named(directions: object, error: type[Exception], text: str) -> None:
+    hits = wive.Scene(*TRIANGLE).intersect(np.zeros((2, 3)), [0.1, 0.1, 1])
+    with pytest.raises(error, match=f"^{re.escape(f'directions must {text}')}$"):
+        hits.spawn(directions)  # type: ignore[arg-type]

@@ -1,0 +1,124 @@
+"""Files that can't be read or written end in one line that names the file."""
+
+import json
+import sys
+
+import numpy as np
+import pytest
+from support.meshes import TRIANGLE
+
+import wive
+from wive._internal.npzfile import read_npy_or_npz
+
+VERTICES, FACES = TRIANGLE
+
+
+def message(error: pytest.ExceptionInfo[Exception]) -> str:
+    text = str(error.value)
+    assert "\n" not in text
+    return text
+
+
+def write_bytes(path, count: int) -> None:
+    path.write_bytes(np.random.default_rng(1).bytes(count))
+
+
+@pytest.mark.parametrize(
+    ("name", "write", "expected"),
+    [
+        ("missing.stl", lambda path: None, "no such file"),
+        ("folder.stl", lambda path: path.mkdir(), "not a file"),
+        ("empty.ply", lambda path: path.touch(), "is empty"),
+        ("text.xyz123", lambda path: path.write_text("hello"), "not a mesh that trimesh can read"),
+        ("noise.ply", lambda path: write_bytes(path, 1000), "not a mesh that trimesh can read"),
+        ("noise.glb", lambda path: write_bytes(path, 1000), "not a mesh that trimesh can read"),
+        (
+            "noise.npz",
+            lambda path: write_bytes(path, 1000),
+            "not an npz file of arrays `vertices` and `faces`, or damaged",
+        ),
+        ("points.obj", lambda path: path.write_text("v 0 0 0\nv 1 0 0\n"), ""),
+        ("other.npz", lambda path: np.savez(path, x=[1]), "expected arrays `vertices` and `faces`, found x"),
+        ("none.npz", lambda path: np.savez(path, vertices=VERTICES, faces=FACES[:0]), "has no triangles"),
+    ],
+)
+def test_a_file_that_is_no_mesh_is_named(tmp_path, name, write, expected):
+    path = tmp_path / name
+    write(path)
+    with pytest.raises((ValueError, OSError)) as error:
+        wive.load_mesh(path)
+    assert message(error).startswith(f"{path}: {expected}")
+
+
+def test_a_truncated_npz_is_damaged(tmp_path):
+    path = tmp_path / "mesh.npz"
+    np.savez(path, vertices=VERTICES, faces=FACES)
+    path.write_bytes(path.read_bytes()[:-200])
+    with pytest.raises(ValueError, match="or damaged") as error:
+        wive.load_mesh(path)
+    assert str(path) in message(error)
+
+
+def test_without_trimesh_mesh_files_say_what_to_install(tmp_path, monkeypatch):
+    path = tmp_path / "mesh.stl"
+    path.write_text("solid")
+    monkeypatch.setitem(sys.modules, "trimesh", None)
+    with pytest.raises(ImportError) as error:
+        wive.load_mesh(path)
+    assert 'pip install "wive[trimesh]"' in message(error)
+
+
+def header(**changes) -> np.ndarray:
+    options = {"backend": "auto", "accuracy": "fast", "nodes": "float32"}
+    return np.array(json.dumps({"format": "wive scene", "version": 1, "options": options, **changes}))
+
+
+@pytest.mark.parametrize(
+    ("arrays", "expected"),
+    [
+        ({"x": [1]}, "not a scene saved by wive"),
+        ({"header": np.array("hello")}, "not a scene saved by wive"),
+        ({"header": header(format="other")}, "not a scene saved by wive"),
+        ({"header": header(options={})}, "not a scene saved by wive"),
+        ({"header": header(version=2)}, "scene file of version 2, this wive reads version 1"),
+        ({"header": header(), "vertices": VERTICES[:2]}, "faces must index the 2 vertices from 0"),
+    ],
+)
+def test_a_file_that_is_no_scene_is_named(tmp_path, arrays, expected):
+    path = tmp_path / "scene"
+    with open(path, "wb") as file:
+        np.savez(file, **{"vertices": VERTICES, "faces": FACES, **arrays})
+    with pytest.raises(ValueError) as error:
+        wive.load(path)
+    assert message(error).startswith(f"{path}: {expected}")
+
+
+def test_loading_what_is_no_file_or_no_npz(tmp_path):
+    path = tmp_path / "scene"
+    with pytest.raises(FileNotFoundError, match="no such file"):
+        wive.load(path)
+    np.save(tmp_path / "array.npy", VERTICES)
+    for content in (b"", b"hello", (tmp_path / "array.npy").read_bytes()):
+        path.write_bytes(content)
+        with pytest.raises(ValueError, match="not a scene saved by wive") as error:
+            wive.load(path)
+        assert str(path) in message(error)
+
+
+def test_a_damaged_npy_header_is_damage_and_not_a_python_error(tmp_path):
+    np.save(tmp_path / "rays.npy", np.zeros((5, 6)))
+    content = (tmp_path / "rays.npy").read_bytes()
+    for old, new in ((b"}", b"("), (b"(5, 6)", b"(5, -6"), (b"<f8", b"<x8")):
+        path = tmp_path / "damaged.npy"
+        path.write_bytes(content.replace(old, new))
+        with pytest.raises(ValueError) as error:
+            read_npy_or_npz(path, "a file of rays")
+        assert message(error) == f"{path}: not a file of rays, or damaged"
+
+
+def test_saving_where_nothing_can_be_written(tmp_path):
+    scene = wive.Scene(VERTICES, FACES)
+    with pytest.raises(FileNotFoundError, match=r"output folder .* does not exist: create it first"):
+        scene.save(tmp_path / "nowhere" / "scene")
+    with pytest.raises(ValueError, match="is not an ordinary file"):
+        scene.save(tmp_path)

@@ -1,0 +1,148 @@
+"""Every bench runs, on a small mesh, and leaves a table, a JSON file and a figure."""
+
+import json
+import os
+import re
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+SCENE = "terrain_2k"
+# What a machine may lack that only some benches need.
+LACKS = re.compile(r"embreex is not installed|carries no libembree4|no C\+\+ compiler|can't open Embree")
+
+pytest.importorskip("matplotlib", reason="matplotlib draws the benches' figures")
+pytest.importorskip("trimesh")
+
+
+@pytest.fixture(scope="module")
+def bench(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., dict[str, Any]]:
+    """Runs a bench with --quick; the content of its JSON file. Skips where the machine lacks Embree."""
+    folder = tmp_path_factory.mktemp("bench")
+    environment = {**os.environ, "XDG_CACHE_HOME": str(folder / "cache")}
+
+    def run(name: str, *options: str) -> dict[str, Any]:
+        answer = subprocess.run(
+            [sys.executable, "-m", "bench", name, "--quick", "--out", str(folder), *options],
+            cwd=ROOT, env=environment, capture_output=True, text=True, timeout=240, check=False,
+        )  # fmt: skip
+        if answer.returncode == 2 and LACKS.search(answer.stderr):
+            pytest.skip(answer.stderr.strip().splitlines()[-1])
+        assert answer.returncode == 0, answer.stderr
+        assert (folder / f"{name}.png").stat().st_size > 10_000
+        content: dict[str, Any] = json.loads((folder / f"{name}.json").read_text())
+        assert {"cpu", "isa", "commit", "wive"} <= content["environment"].keys()
+        return content
+
+    return run
+
+
+def test_bench_embree_finds_embrees_hits(bench: Callable[..., dict[str, Any]]) -> None:
+    content = bench("embree", "--scenes", SCENE, "--accuracy", "watertight")
+    assert {row["in_flight"] for row in content["speed"]} == {1, "tuned"}
+    for row in content["speed"]:
+        assert row["mismatches"] <= 1e-3 * row["count"]
+    assert content["trees"][0]["wive_sah"] > 0
+
+
+def test_bench_paper_renders_embrees_picture(bench: Callable[..., dict[str, Any]]) -> None:
+    content = bench("paper", "--scenes", SCENE)
+    assert content["rows"]
+    for row in content["rows"]:
+        assert row["mean_difference"] < 0.01
+        assert row["differing"] < 0.1
+
+
+def test_bench_order_traces_every_order(bench: Callable[..., dict[str, Any]]) -> None:
+    content = bench("order", "--scenes", SCENE)
+    orders = {"treelet", "diagonal", "slots", "none", "distance"}
+    for table in ("rows", "speed"):
+        assert {row["order"] for row in content[table]} == orders
+    for row in content["rows"]:
+        assert row["other_hits"] <= 1e-3 * row["count"]
+
+
+def test_bench_inflight_counts_steps_and_measures_memory(bench: Callable[..., dict[str, Any]]) -> None:
+    content = bench("inflight", "--scenes", SCENE, "--in-flight", "1,8")
+    assert content["memory_latency_ns"] > 0
+    assert [row["in_flight"] for row in content["rows"]] == [1, 8, "tuned"] * 2
+    assert all(row["steps"] > 1 for row in content["rows"])
+
+
+def test_bench_build_counts_bytes(bench: Callable[..., dict[str, Any]]) -> None:
+    content = bench("build", "--scenes", SCENE, "--threads", "1", "--quality", "medium")
+    assert [row["threads"] for row in content["build"]] == [1]
+    assert 30 < content["trees"][0]["wive_bytes"] < 100
+
+
+def test_bench_python_agrees_on_closest_hits(bench: Callable[..., dict[str, Any]]) -> None:
+    content = bench("python", "--scenes", SCENE)
+    closest = [row for row in content["rows"] if not row["query"].startswith("all")]
+    if not closest:
+        pytest.skip("; ".join(content["missing"]))
+    for row in closest:
+        assert abs(row["wive_hits"] - row["other_hits"]) <= 1e-3 * row["count"]
+    assert all(row["p50_us"] > 0 for row in content["single"])
+
+
+def test_bench_pareto_finds_no_leak_where_none_is_promised(bench: Callable[..., dict[str, Any]]) -> None:
+    content = bench("pareto")
+    means = {row["contender"]: row for row in content["means"]}
+    assert {"fast", "watertight", "compressed", "exact", "float64"} <= means.keys()
+    for name in ("watertight", "compressed", "exact", "float64"):
+        assert means[name]["leaks"] == 0
+    assert means["float64"]["t_worst"] < 1e-3
+    assert all(ratio > 0 for ratio in content["float64_to_float32"].values())
+    assert means["exact"]["wrong"] == 0
+    assert means["exact"]["t_worst"] < 0.51
+    assert all(row["mrays"] > 0 for row in means.values())
+
+
+def test_a_tiled_scene_holds_every_copy(bench: Callable[..., dict[str, Any]]) -> None:
+    from_one, from_six = (
+        bench("build", "--scenes", name, "--threads", "1", "--quality", "medium")["trees"][0]["triangles"]
+        for name in (SCENE, f"{SCENE}_tiled_3x2")
+    )
+    assert from_six == 6 * from_one
+
+
+def test_an_unknown_scene_ends_in_one_line(bench: Callable[..., dict[str, Any]]) -> None:
+    answer = subprocess.run(
+        [sys.executable, "-m", "bench", "order", "--scenes", "nowhere"],
+        cwd=ROOT, capture_output=True, text=True, timeout=60, check=False,
+    )  # fmt: skip
+    assert answer.returncode == 2
+    assert answer.stderr.startswith("bench order: no scene 'nowhere'")
+    assert answer.stderr.count("\n") == 1
+
+
+def quote(*options: str) -> str:
+    """What `python -m bench quote` prints."""
+    answer = subprocess.run(
+        [sys.executable, "-m", "bench", "quote", *options],
+        cwd=ROOT, capture_output=True, text=True, timeout=60, check=False,
+    )  # fmt: skip
+    assert answer.returncode == 0, answer.stderr
+    return answer.stdout
+
+
+def test_the_documents_tables_are_those_of_the_results(tmp_path: Path) -> None:
+    text = (ROOT / "docs" / "benchmarks.md").read_text()
+    copy = tmp_path / "benchmarks.md"
+    copy.write_text(re.sub(r"(<!-- quote: .* -->\n).*?(<!-- end -->)", r"\1\2", text, flags=re.DOTALL))
+    assert copy.read_text() != text
+    assert quote("--document", str(copy)) == ""
+    assert copy.read_text() == text
+
+
+def test_a_table_without_results_stays_as_it_is(tmp_path: Path) -> None:
+    document = tmp_path / "some.md"
+    document.write_text("before\n<!-- quote: paper.gains -->\n\nold\n<!-- end -->\nafter\n")
+    said = quote("--document", str(document), "--results", str(tmp_path))
+    assert said == "paper.gains: no results yet, run `python -m bench paper`\n"
+    assert "old" in document.read_text()

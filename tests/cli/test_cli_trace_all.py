@@ -1,0 +1,28 @@
+"""`wive trace --all` writes every hit of every ray."""
+
+import numpy as np
+import pytest
+from support.meshes import random_rays, soup
+
+import wive
+from wive._internal import commands
+from wive.cli import main
+
+
+@pytest.mark.parametrize("count", [1003, 0])
+def test_trace_all_writes_the_hits_of_the_library(tmp_path, capsys, monkeypatch, count):
+    monkeypatch.setattr(commands, "BATCH_RAYS", 100)
+    vertices, faces = soup(200, seed=1)
+    np.savez(tmp_path / "soup.npz", vertices=vertices, faces=faces)
+    origins, directions = random_rays(count, seed=2, low=-0.5, high=1.5)
+    np.save(tmp_path / "rays.npy", np.column_stack([origins, directions]))
+    files = [str(tmp_path / name) for name in ("soup.npz", "rays.npy", "hits.npz")]
+    assert main(["trace", "--all", *files[:2], "-o", files[2]]) == 0
+    expected = wive.Scene(vertices, faces).intersect_all(origins, directions)
+    assert f"{count:,} rays in" in (said := capsys.readouterr().out)
+    assert f", {len(expected.t):,} hits, " in said
+    with np.load(files[2]) as hits:
+        assert sorted(hits) == ["offsets", "prim", "t", "uv"]
+        for name in hits:
+            np.testing.assert_array_equal(hits[name], getattr(expected, name))
+            assert hits[name].dtype == getattr(expected, name).dtype

@@ -1,0 +1,140 @@
+"""Results that depend on nothing but the rays, from threads and from forked processes."""
+
+import multiprocessing
+import threading
+import time
+import warnings
+
+import numpy as np
+import pytest
+from support.meshes import random_rays, soup, sphere
+
+import wive
+
+
+def answers(scene: wive.Scene, rays: tuple[np.ndarray, np.ndarray], **options) -> list[np.ndarray]:
+    hits = scene.intersect(*rays, **options)
+    return [hits.t, hits.prim, hits.uv, scene.occluded(*rays, **options)]
+
+
+def assert_same(one: list[np.ndarray], other: list[np.ndarray]) -> None:
+    for left, right in zip(one, other, strict=True):
+        np.testing.assert_array_equal(left, right)
+
+
+@pytest.fixture
+def scene(backend) -> wive.Scene:
+    return wive.Scene(*soup(3000, seed=1, size=0.05), backend=backend)
+
+
+def test_threads_and_rays_in_flight_change_no_bit(scene):
+    rays = random_rays(20_011, seed=2, low=0, high=1)
+    one_by_one = answers(scene, rays, threads=1, in_flight=1)
+    for options in (
+        {},
+        {"threads": 7},
+        {"threads": 100_000},
+        {"in_flight": 5},
+        {"threads": 3, "in_flight": 64},
+    ):
+        assert_same(answers(scene, rays, **options), one_by_one)
+
+
+def test_splitting_a_batch_changes_no_bit(scene):
+    origins, directions = random_rays(1003, seed=3, low=0, high=1)
+    whole = answers(scene, (origins, directions))
+    for size in (1, 7, 64, 1000):
+        parts = [
+            answers(scene, (origins[first : first + size], directions[first : first + size]))
+            for first in range(0, len(origins), size)
+        ]
+        assert_same([np.concatenate(arrays) for arrays in zip(*parts, strict=True)], whole)
+
+
+def test_threads_may_share_a_scene(scene):
+    rays = random_rays(5000, seed=4, low=0, high=1)
+    expected = answers(scene, rays)
+    found: list[list[np.ndarray]] = []
+    workers = [threading.Thread(target=lambda: found.append(answers(scene, rays))) for _ in range(4)]
+    for worker in workers:
+        worker.start()
+    for worker in workers:
+        worker.join()
+    assert len(found) == 4
+    for answer in found:
+        assert_same(answer, expected)
+
+
+@pytest.mark.timeout(60)
+def test_a_forked_child_traces_as_its_parent_did(scene):
+    rays = random_rays(20_000, seed=5, low=0, high=1)
+    expected = answers(scene, rays, threads=4)
+    context = multiprocessing.get_context("fork")
+    receiver, sender = context.Pipe(duplex=False)
+
+    def trace_and_build() -> None:
+        rebuilt = wive.Scene(scene.vertices, scene.faces, backend=scene.backend)
+        sender.send([answers(scene, rays, threads=4), answers(rebuilt, rays, threads=4)])
+
+    child = context.Process(target=trace_and_build)
+    with warnings.catch_warnings():
+        # Python warns of any fork while other threads live, whoever started them.
+        warnings.simplefilter("ignore", DeprecationWarning)
+        child.start()
+    try:
+        assert receiver.poll(30), "the forked child hangs"
+        for answer in receiver.recv():
+            assert_same(answer, expected)
+        child.join(10)
+        assert child.exitcode == 0
+    finally:
+        child.kill()
+        child.join()
+    assert_same(answers(scene, rays, threads=4), expected)
+
+
+def trace(scene: wive.Scene) -> None:
+    scene.intersect(*random_rays(1_000_000, seed=6), threads=1)
+
+
+def draw(scene: wive.Scene) -> None:
+    wive.render(scene, width=512, height=512, spp=2, threads=1)
+
+
+@pytest.mark.parametrize("work", [trace, draw])
+def test_other_python_threads_run_while_rays_are_traced(monkeypatch, work):
+    """Each call into the core is timed; a counting thread must advance during it."""
+    scene = wive.Scene(*sphere(6))
+    monkeypatch.setattr(wive.rendering, "BAND_PATHS", 10**9)
+    ticks, stop = [0], threading.Event()
+
+    def count() -> None:
+        while not stop.is_set():
+            ticks[0] += 1
+            time.sleep(0.0005)
+
+    class Watched:
+        def __getattr__(self, name):
+            method = getattr(bvh, name)
+
+            def call(*arguments, **keywords):
+                ticks_before, begin = ticks[0], time.perf_counter()
+                result = method(*arguments, **keywords)
+                seen.append((ticks[0] - ticks_before, time.perf_counter() - begin))
+                return result
+
+            return call
+
+    bvh, seen = scene._bvh, []
+    monkeypatch.setattr(scene, "_bvh", Watched())
+    monkeypatch.setattr(wive.Scene, "bounds", property(lambda self: bvh.bounds))
+    counter = threading.Thread(target=count)
+    counter.start()
+    try:
+        work(scene)
+    finally:
+        stop.set()
+        counter.join()
+    ((ticked, seconds),) = seen
+    assert seconds > 0.02
+    assert ticked >= 5

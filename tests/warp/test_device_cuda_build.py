@@ -1,0 +1,42 @@
+"""What CUDA devices run for pictures and hits compiles without one, and rounds as the CPU does."""
+
+import re
+
+import pytest
+
+wp = pytest.importorskip("warp")
+
+from wive.warp_kernels.lanes.precision import PRECISIONS  # noqa: E402
+from wive.warp_kernels.scene import hits as warp_hits  # noqa: E402
+from wive.warp_kernels.scene import shading as warp_shading  # noqa: E402
+from wive.warp_kernels.scene import spawn as warp_spawn  # noqa: E402
+
+ARCHITECTURES = (80, 90, 100)
+ARITHMETIC = re.compile(r"\b(?:add|sub|mul|fma|mad|div|rcp|sqrt|rsqrt)\.[a-z0-9.]*f(?:32|64)\b")
+
+
+def modules() -> dict[str, tuple[wp.Module, tuple[str, ...]]]:
+    """What is compiled together, and the kernels in it."""
+    found = {"shading": (wp.get_module(warp_shading.__name__), ("start_paths", "shade", "gather"))}
+    for precision in PRECISIONS:
+        found[f"hits {precision}"] = (
+            warp_hits.hit_kernels(precision).points.module,
+            ("mask", "points", "normals"),
+        )
+        kernels = warp_spawn.bounds_kernel(precision), warp_spawn.spawn_kernel(precision)
+        found[f"spawn {precision}"] = kernels[0].module, ("bound_errors", "spawn_origins")
+    return found
+
+
+@pytest.mark.parametrize("architecture", ARCHITECTURES)
+@pytest.mark.parametrize("name", modules())
+def test_every_operation_is_rounded_on_its_own_on_cuda(tmp_path, name, architecture):
+    module, kernels = modules()[name]
+    wp.compile_aot_module(module, arch=architecture, module_dir=tmp_path, use_ptx=True)
+    (ptx,) = (path.read_text() for path in tmp_path.glob("*.ptx"))
+    for kernel in kernels:
+        assert re.search(rf"\.entry \w*{kernel}_\w+_cuda_kernel_forward\(", ptx)
+    found = set(ARITHMETIC.findall(ptx))
+    # PTX writes "rn" where it rounds once to nearest; add and sub without it may be fused with a mul.
+    assert any(operation.startswith("sqrt.rn") for operation in found)
+    assert not [name for name in found if ".rn." not in name or name.startswith(("fma", "mad"))]

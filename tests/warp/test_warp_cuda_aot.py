@@ -1,0 +1,262 @@
+"""The CUDA side without a GPU: every kernel is built ahead of time, and held to what the assembler says.
+
+Warp brings NVRTC, which compiles to PTX. Registers, stack and spills come from ptxas, which has to be as new
+as that NVRTC: `pip install nvidia-cuda-nvcc`, a CUDA toolkit, or WIVE_PTXAS=/path/to/ptxas.
+"""
+
+import importlib.util
+import os
+import re
+import shutil
+import subprocess
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+wp = pytest.importorskip("warp")
+
+from wive.warp_kernels.launching import kernels, kernels_all, sorting  # noqa: E402
+from wive.warp_kernels.launching.launch import default_block_dim  # noqa: E402
+
+ARCHITECTURES = (80, 90, 100)
+STACK = 96
+KERNELS = {
+    "closest": kernels.closest_kernel,
+    "any": kernels.any_kernel,
+    "count": kernels_all.count_kernel,
+    "all": kernels_all.all_kernel,
+}
+
+# Every query on one architecture, and on the others those two that hold nearly all there is to compile; exact
+# trees, which take longest, on one architecture.
+_BUILDS = [(query, 90) for query in KERNELS] + [
+    (query, architecture)
+    for query in ("closest", "any")
+    for architecture in ARCHITECTURES
+    if architecture != 90
+]
+EXACT_QUERIES = ("closest", "count")
+BUILDS = [(*build, accuracy) for build in _BUILDS for accuracy in ("fast", "watertight")] + [
+    (query, 90, "exact") for query in EXACT_QUERIES
+]
+COMPRESSED_BUILDS = [(query, accuracy) for query in KERNELS for accuracy in ("fast", "watertight")] + [
+    (query, "exact") for query in EXACT_QUERIES
+]
+DOUBLE_BUILDS = [
+    (query, 90, accuracy, "float32") for query in KERNELS for accuracy in ("fast", "watertight")
+] + [
+    ("closest", 80, "watertight", "float32"),
+    ("closest", 100, "watertight", "float32"),
+    ("closest", 90, "watertight", "compressed"),
+]
+
+# Registers, measured with NVRTC and ptxas 13.5 and rounded up to a multiple of eight.
+REGISTERS = {
+    ("fast", 8): 96,
+    ("watertight", 8): 112,
+    ("fast", 1): 72,
+    ("watertight", 1): 96,
+    ("exact", 8): 128,
+    ("exact", 1): 112,
+}
+# The same of compressed nodes: unpacking takes a few.
+COMPRESSED_REGISTERS = {
+    ("fast", 8): 96,
+    ("watertight", 8): 112,
+    ("fast", 1): 80,
+    ("watertight", 1): 96,
+    ("exact", 8): 128,
+    ("exact", 1): 120,
+}
+# The same of float64 scenes, in either form of nodes.
+DOUBLE_REGISTERS = {
+    ("fast", 8): 152,
+    ("watertight", 8): 144,
+    ("fast", 1): 120,
+    ("watertight", 1): 104,
+}
+# Bytes: a thread that owns its stack holds a child and, for the closest hit, a distance an entry, and up to
+# eleven words of the ray behind them. A group's stack is in shared memory.
+STACK_BYTES = {
+    "closest": STACK * 8 + 48,
+    "any": STACK * 4 + 48,
+    "count": STACK * 4 + 48,
+    "all": STACK * 4 + 48,
+}
+DOUBLE_STACK_BYTES = 32  # more: rays are kept in double
+EXACT_STACK_BYTES = 9 * 1024  # the integers of the rare cases: two triangles' where hits are compared
+
+
+def stack_limit(query: str, accuracy: str, lanes: int) -> int:
+    """The most local memory that a thread may take, in bytes."""
+    own = EXACT_STACK_BYTES if accuracy == "exact" else 0
+    return own + (STACK_BYTES[query] if lanes == 8 else 0)
+
+
+@dataclass(frozen=True)
+class Usage:
+    """What a kernel's threads take."""
+
+    registers: int
+    stack: int
+    spills: int
+
+
+def compiled_ptx(module: wp.Module, architecture: int, folder: Path) -> str:
+    """The PTX of a module, as NVRTC wrote it. Raises where CUDA code does not compile."""
+    wp.compile_aot_module(module, arch=architecture, module_dir=str(folder), use_ptx=True)
+    (path,) = folder.glob(f"*.sm{architecture}.ptx")
+    return path.read_text().rstrip("\0")
+
+
+def find_ptxas() -> Iterator[Path]:
+    """Every ptxas there is to try, in the order of preference."""
+    if asked := os.environ.get("WIVE_PTXAS"):
+        yield Path(asked)
+    spec = importlib.util.find_spec("nvidia")
+    for folder in (spec.submodule_search_locations if spec is not None else None) or []:
+        yield from sorted(Path(folder).glob("*/bin/ptxas"), reverse=True)
+    if on_path := shutil.which("ptxas"):
+        yield Path(on_path)
+    yield from sorted(Path("/usr/local").glob("cuda*/bin/ptxas"), reverse=True)
+
+
+def assemble(ptx: str, architecture: int, folder: Path) -> Usage:
+    """Assemble PTX and read what ptxas says of its kernel; skip where no ptxas here knows its version."""
+    source = folder / "kernel.ptx"
+    source.write_text(ptx)
+    tried = []
+    for ptxas in find_ptxas():
+        command = [
+            str(ptxas),
+            "-v",
+            f"--gpu-name=sm_{architecture}",
+            str(source),
+            "-o",
+            str(folder / "kernel.cubin"),
+        ]
+        run = subprocess.run(command, capture_output=True, text=True, timeout=120)
+        if "Unsupported .version" in run.stderr:
+            tried.append(str(ptxas))
+            continue
+        assert run.returncode == 0, run.stderr
+        frames = re.findall(
+            r"(\d+) bytes stack frame, (\d+) bytes spill stores, (\d+) bytes spill loads", run.stderr
+        )
+        registers = re.findall(r"Used (\d+) registers", run.stderr)
+        assert frames and registers, run.stderr
+        return Usage(
+            registers=max(map(int, registers)),
+            stack=max(int(frame[0]) for frame in frames),
+            spills=sum(int(frame[1]) + int(frame[2]) for frame in frames),
+        )
+    pytest.skip(
+        f"no ptxas reads this PTX (tried: {', '.join(tried) or 'none found'}): pip install nvidia-cuda-nvcc"
+    )
+
+
+@pytest.mark.timeout(120)
+@pytest.mark.parametrize("lanes", [8, 1])
+@pytest.mark.parametrize(("query", "architecture", "accuracy"), BUILDS)
+def test_kernel_compiles_for_cuda_within_its_limits(
+    query: str, architecture: int, accuracy: str, lanes: int, tmp_path: Path
+) -> None:
+    kernel = KERNELS[query](accuracy, lanes, STACK)
+    kernel.module.options["block_dim"] = default_block_dim(lanes)
+    ptx = compiled_ptx(kernel.module, architecture, tmp_path)
+    # The CUDA branches are what was compiled: the collectives of a group, wide loads of a thread.
+    assert ("redux.sync" in ptx) == (lanes == 1)
+    assert ("ld.global.nc.v4" in ptx) == (lanes == 8)
+    usage = assemble(ptx, architecture, tmp_path)
+    assert usage.spills == 0
+    assert usage.stack <= stack_limit(query, accuracy, lanes)
+    assert usage.registers <= REGISTERS[accuracy, lanes]
+
+
+@pytest.mark.timeout(120)
+@pytest.mark.parametrize("lanes", [8, 1])
+@pytest.mark.parametrize(("query", "accuracy"), COMPRESSED_BUILDS)
+def test_kernel_for_compressed_nodes_compiles_within_its_limits(
+    query: str, accuracy: str, lanes: int, tmp_path: Path
+) -> None:
+    kernel = KERNELS[query](accuracy, lanes, STACK, nodes="compressed")
+    kernel.module.options["block_dim"] = default_block_dim(lanes)
+    usage = assemble(compiled_ptx(kernel.module, 90, tmp_path), 90, tmp_path)
+    assert usage.spills == 0
+    assert usage.stack <= stack_limit(query, accuracy, lanes)
+    assert usage.registers <= COMPRESSED_REGISTERS[accuracy, lanes]
+
+
+@pytest.mark.timeout(120)
+@pytest.mark.parametrize("lanes", [8, 1])
+@pytest.mark.parametrize(("query", "architecture", "accuracy", "nodes"), DOUBLE_BUILDS)
+def test_kernel_for_float64_scenes_compiles_within_its_limits(
+    query: str, architecture: int, accuracy: str, nodes: str, lanes: int, tmp_path: Path
+) -> None:
+    kernel = KERNELS[query](accuracy, lanes, STACK, nodes=nodes, precision="float64")
+    kernel.module.options["block_dim"] = default_block_dim(lanes)
+    ptx = compiled_ptx(kernel.module, architecture, tmp_path)
+    assert ("ld.global.nc.v2.f64" in ptx) == (lanes == 8)
+    usage = assemble(ptx, architecture, tmp_path)
+    assert usage.spills == 0
+    assert usage.stack <= stack_limit(query, accuracy, lanes) + (DOUBLE_STACK_BYTES if lanes == 8 else 0)
+    assert usage.registers <= DOUBLE_REGISTERS[accuracy, lanes]
+
+
+@pytest.mark.timeout(120)
+@pytest.mark.parametrize("lanes", [8, 1])
+def test_kernel_with_counters_compiles_for_cuda(lanes: int, tmp_path: Path) -> None:
+    for query in ("closest", "any", "count"):
+        folder = tmp_path / query
+        folder.mkdir()
+        compiled_ptx(KERNELS[query]("watertight", lanes, STACK, True).module, 90, folder)
+
+
+@pytest.mark.timeout(120)
+@pytest.mark.parametrize(
+    "kernel", [sorting.sort_kernel("float32"), sorting.sort_kernel("float64"), sorting.shift_counts]
+)
+def test_kernel_that_orders_hits_keeps_them_in_registers(kernel: wp.Kernel, tmp_path: Path) -> None:
+    usage = assemble(compiled_ptx(kernel.module, 90, tmp_path), 90, tmp_path)
+    assert usage.spills == usage.stack == 0
+    assert usage.registers <= 64
+
+
+@wp.func_native("""
+#if defined(__CUDA_ARCH__)
+    return __reduce_or_sink(0xffu, x);
+#else
+    return x;
+#endif
+""")
+def broken_on_cuda(x: wp.uint32) -> wp.uint32: ...
+
+
+@wp.kernel(module="unique", enable_backward=False)
+def planted_fault(x: wp.array(dtype=wp.uint32)):
+    x[0] = broken_on_cuda(x[0])
+
+
+@wp.kernel(module="unique", enable_backward=False)
+def planted_spill(x: wp.array(dtype=wp.float32)):
+    kept = wp.vector(dtype=wp.float32, length=96)
+    for i in range(96):
+        kept[i] = x[i]
+    at = int(x[0])
+    x[0] = kept[at]
+
+
+@pytest.mark.timeout(60)
+def test_guard_fails_on_a_broken_cuda_branch(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    array = wp.ones(1, dtype=wp.uint32, device="cpu")
+    wp.launch(planted_fault, 1, inputs=[array], device="cpu")  # the CPU branch has nothing wrong with it
+    with pytest.raises(Exception, match=r"CUDA|NVRTC|build"):
+        compiled_ptx(planted_fault.module, 90, tmp_path)
+
+
+@pytest.mark.timeout(60)
+def test_guard_sees_memory_that_a_kernel_falls_back_to(tmp_path: Path) -> None:
+    usage = assemble(compiled_ptx(planted_spill.module, 90, tmp_path), 90, tmp_path)
+    assert usage.stack >= 96 * 4

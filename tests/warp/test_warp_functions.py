@@ -1,0 +1,181 @@
+"""closest_hit and any_hit in users' own kernels, with Warp's default options, answer as the C++ core."""
+
+import dataclasses
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+wp = pytest.importorskip("warp")
+
+from support.meshes import random_rays, soup  # noqa: E402
+from support.warp_launches import INFINITE, ZERO, Answers, assert_bit_identical, cpu_answers  # noqa: E402
+
+from wive import _cpu, warp_kernels  # noqa: E402
+
+pytestmark = pytest.mark.timeout(120)
+
+
+@wp.kernel
+def trace_watertight(
+    bvh: warp_kernels.Bvh,
+    origins: wp.array(dtype=wp.vec3),
+    directions: wp.array(dtype=wp.vec3),
+    hits: wp.array(dtype=warp_kernels.Hit),
+    occluded: wp.array(dtype=wp.bool),
+):
+    i = wp.tid()
+    hits[i] = warp_kernels.closest_hit(bvh, origins[i], directions[i], 0.0, wp.inf)
+    occluded[i] = warp_kernels.any_hit(bvh, origins[i], directions[i], 0.0, wp.inf)
+
+
+@wp.kernel
+def trace_fast(
+    bvh: warp_kernels.FastBvh,
+    origins: wp.array(dtype=wp.vec3),
+    directions: wp.array(dtype=wp.vec3),
+    hits: wp.array(dtype=warp_kernels.Hit),
+    occluded: wp.array(dtype=wp.bool),
+):
+    i = wp.tid()
+    hits[i] = warp_kernels.closest_hit(bvh, origins[i], directions[i], 0.0, wp.inf)
+    occluded[i] = warp_kernels.any_hit(bvh, origins[i], directions[i], 0.0, wp.inf)
+
+
+@wp.kernel
+def count_watertight(
+    bvh: warp_kernels.Bvh,
+    origins: wp.array(dtype=wp.vec3),
+    directions: wp.array(dtype=wp.vec3),
+    counts: wp.array(dtype=wp.int32),
+):
+    i = wp.tid()
+    counts[i] = warp_kernels.count_hits(bvh, origins[i], directions[i], 0.25, 1.5)
+
+
+@wp.kernel
+def count_fast(
+    bvh: warp_kernels.FastBvh,
+    origins: wp.array(dtype=wp.vec3),
+    directions: wp.array(dtype=wp.vec3),
+    counts: wp.array(dtype=wp.int32),
+):
+    i = wp.tid()
+    counts[i] = warp_kernels.count_hits(bvh, origins[i], directions[i], 0.25, 1.5)
+
+
+@wp.kernel
+def trace_exact(
+    bvh: warp_kernels.ExactBvh,
+    origins: wp.array(dtype=wp.vec3),
+    directions: wp.array(dtype=wp.vec3),
+    hits: wp.array(dtype=warp_kernels.Hit),
+    occluded: wp.array(dtype=wp.bool),
+):
+    i = wp.tid()
+    hits[i] = warp_kernels.closest_hit(bvh, origins[i], directions[i], 0.0, wp.inf)
+    occluded[i] = warp_kernels.any_hit(bvh, origins[i], directions[i], 0.0, wp.inf)
+
+
+@wp.kernel
+def count_exact(
+    bvh: warp_kernels.ExactBvh,
+    origins: wp.array(dtype=wp.vec3),
+    directions: wp.array(dtype=wp.vec3),
+    counts: wp.array(dtype=wp.int32),
+):
+    i = wp.tid()
+    counts[i] = warp_kernels.count_hits(bvh, origins[i], directions[i], 0.25, 1.5)
+
+
+COUNTERS = {"watertight": count_watertight, "fast": count_fast, "exact": count_exact}
+KERNELS = {"watertight": trace_watertight, "fast": trace_fast, "exact": trace_exact}
+
+
+def trace(kernel: wp.Kernel, tree: warp_kernels.Tree, rays: tuple[np.ndarray, np.ndarray]) -> Answers:
+    origins, directions = (wp.array(a, dtype=wp.vec3, device="cpu") for a in rays)
+    hits = wp.zeros(len(origins), dtype=warp_kernels.Hit, device="cpu")
+    occluded = wp.zeros(len(origins), dtype=wp.bool, device="cpu")
+    wp.launch(kernel, len(origins), inputs=[tree.handle, origins, directions, hits, occluded], device="cpu")
+    found = hits.numpy()
+    uv = np.stack([found["u"], found["v"]], axis=1)
+    none = np.zeros((len(found), 3), np.int32)
+    return Answers(found["t"], found["prim"], uv, occluded.numpy(), *[none] * 8)
+
+
+@pytest.mark.parametrize("accuracy", KERNELS)
+def test_functions_in_a_users_kernel_give_the_bits_of_the_core(accuracy: str) -> None:
+    bvh = _cpu.Bvh(*soup(3000, 1), accuracy)
+    rays = random_rays(2000, 2, 0.0, 1.0)
+    rays[1][::100] = 0
+    tree = warp_kernels.upload(bvh, "cpu")
+    found = trace(KERNELS[accuracy], tree, rays)
+    warp_kernels.check(tree)
+    assert_bit_identical(
+        found, cpu_answers(bvh, "scalar", *rays, ZERO, INFINITE), ("t", "prim", "uv", "occluded")
+    )
+
+
+@pytest.mark.parametrize("accuracy", COUNTERS)
+def test_hits_counted_in_a_users_kernel_are_those_of_the_core(accuracy: str) -> None:
+    bvh = _cpu.Bvh(*soup(3000, 1), accuracy)
+    rays = random_rays(2000, 2, 0.0, 1.0)
+    expected, _ = bvh.count("scalar", *rays, np.float32([0.25]), np.float32([1.5]))
+    tree = warp_kernels.upload(bvh, "cpu")
+    counts = wp.zeros(2000, dtype=wp.int32, device="cpu")
+    vectors = [wp.array(a, dtype=wp.vec3, device="cpu") for a in rays]
+    wp.launch(COUNTERS[accuracy], 2000, inputs=[tree.handle, *vectors, counts], device="cpu")
+    warp_kernels.check(tree)
+    assert expected.max() > 5
+    np.testing.assert_array_equal(counts.numpy(), expected)
+
+
+@pytest.mark.parametrize("other", ["fast", "exact"])
+def test_handle_of_the_wrong_accuracy_is_an_error_and_misses(other: str) -> None:
+    tree = warp_kernels.upload(_cpu.Bvh(*soup(100, 1), other), "cpu")
+    found = trace(trace_watertight, tree, random_rays(50, 2))
+    assert (found.prim == -1).all() and not found.occluded.any()
+    with pytest.raises(
+        warp_kernels.CorruptTreeError, match="given to a kernel that takes that of another accuracy"
+    ):
+        warp_kernels.check(tree)
+
+
+def test_handle_of_a_compressed_tree_is_an_error_and_misses() -> None:
+    tree = warp_kernels.upload(_cpu.Bvh(*soup(100, 1), nodes="compressed"), "cpu")
+    found = trace(trace_watertight, tree, random_rays(50, 2))
+    assert (found.prim == -1).all() and not found.occluded.any()
+    with pytest.raises(warp_kernels.CorruptTreeError, match="take trees with nodes 'float32'"):
+        warp_kernels.check(tree)
+
+
+def test_handle_of_a_float64_tree_is_an_error_and_misses() -> None:
+    vertices, faces = soup(100, 1)
+    tree = warp_kernels.upload(_cpu.Bvh(vertices.astype(np.float64), faces), "cpu")
+    found = trace(trace_watertight, tree, random_rays(50, 2))
+    assert (found.prim == -1).all() and not found.occluded.any()
+    with pytest.raises(warp_kernels.CorruptTreeError, match=r"float32 vertices.*astype\(np.float32\)"):
+        warp_kernels.check(tree)
+
+
+def test_tree_too_deep_for_the_functions_is_an_error_and_misses() -> None:
+    tree = warp_kernels.upload(_cpu.Bvh(*soup(100, 1)), "cpu")
+    tree.handle.stack = 129
+    found = trace(trace_watertight, dataclasses.replace(tree), random_rays(50, 2))
+    assert (found.prim == -1).all()
+    with pytest.raises(warp_kernels.CorruptTreeError, match="too deep for closest_hit"):
+        warp_kernels.check(tree)
+
+
+def test_example_prints_a_tower_and_the_sky_it_hides() -> None:
+    example = Path(__file__).resolve().parents[2] / "examples" / "ambient_occlusion.py"
+    run = subprocess.run([sys.executable, str(example)], capture_output=True, text=True, timeout=100)
+    assert run.returncode == 0, run.stderr
+    lines = [line for line in run.stdout.splitlines() if line]
+    middle, corner = lines[-13], lines[-24]
+    assert len(lines) >= 24
+    assert middle[20:28] == " " * 8, "the tower itself"
+    assert middle[18] not in " .", "the ground beside it sees less sky"
+    assert set(corner[:4]) <= {" ", "."}, "the far corner sees nearly all"

@@ -1,0 +1,127 @@
+"""Every query, accuracy and backend on the same rays: the Warp forms answer bit for bit as the C++ core."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+pytest.importorskip("warp")
+
+from support.hard_rays import HARD_MESHES, hard_rays
+from support.meshes import random_rays, soup, sphere
+from support.warp_launches import assert_bit_identical, cpu_answers, warp_answers
+
+from wive import _cpu
+
+pytestmark = pytest.mark.timeout(120)
+
+HITS = ("t", "prim", "uv", "occluded", "counts", "offsets", "all_t", "all_prim", "all_uv")
+CPU_KERNELS = [name for name, reason in _cpu.kernels().items() if not reason and "." not in name]
+ACCURACIES = ("fast", "watertight", "exact")
+FORMS = ("float32", "compressed")
+Mesh = tuple[np.ndarray, np.ndarray]
+
+
+def inside(vertices: np.ndarray, count: int, seed: int) -> Mesh:
+    """Rays from random points of a mesh's box, in random directions."""
+    origins, directions = random_rays(count, seed, 0.0, 1.0)
+    low, high = vertices.min(axis=0), vertices.max(axis=0)
+    return (low + (high - low) * origins).astype(np.float32), directions
+
+
+@pytest.mark.parametrize("accuracy", ACCURACIES)
+@pytest.mark.parametrize(
+    ("scene", "nodes"), [("staircase", "float32"), ("living_room", "float32"), ("living_room", "compressed")]
+)
+def test_every_backend_gives_the_same_bits_on_real_scenes(
+    scene: str, nodes: str, accuracy: str, scenes: Callable[[str], Mesh]
+) -> None:
+    vertices, faces = scenes(scene)
+    bvh = _cpu.Bvh(
+        np.ascontiguousarray(vertices, np.float32),
+        np.ascontiguousarray(faces, np.int32),
+        accuracy,
+        nodes=nodes,
+    )
+    origins, directions = inside(vertices, 20_000, 1)
+    reference = cpu_answers(bvh, "scalar", origins, directions)
+    assert (reference.prim >= 0).mean() > 0.5
+    for kernel in CPU_KERNELS:
+        assert_bit_identical(cpu_answers(bvh, kernel, origins, directions), reference, HITS)
+    assert_bit_identical(warp_answers(bvh, 8, origins, directions), reference)
+    few = slice(0, 1500)  # fibers are slow
+    one_lane = warp_answers(bvh, 1, origins[few], directions[few])
+    assert_bit_identical(one_lane, cpu_answers(bvh, "scalar", origins[few], directions[few]))
+
+
+@pytest.mark.parametrize("nodes", FORMS)
+@pytest.mark.parametrize("accuracy", ACCURACIES)
+@pytest.mark.parametrize("count", [1, 3, 13, 101])
+def test_partial_blocks_answer_as_full_ones(count: int, accuracy: str, nodes: str) -> None:
+    bvh = _cpu.Bvh(*soup(3000, 2), accuracy, nodes=nodes)
+    origins, directions = random_rays(count, 3)
+    reference = cpu_answers(bvh, "scalar", origins, directions)
+    for lanes in (8, 1):
+        assert_bit_identical(warp_answers(bvh, lanes, origins, directions), reference)
+
+
+@pytest.mark.parametrize("block_dim", [8, 24, 128])
+def test_block_size_does_not_change_the_answer(block_dim: int) -> None:
+    bvh = _cpu.Bvh(*soup(3000, 2))
+    origins, directions = random_rays(101, 4)
+    reference = cpu_answers(bvh, "scalar", origins, directions)
+    assert_bit_identical(warp_answers(bvh, 1, origins, directions, block_dim=block_dim), reference)
+
+
+@pytest.mark.parametrize("lanes", [8, 1])
+def test_groups_of_a_block_go_their_own_ways(lanes: int) -> None:
+    """In one block: rays that miss at once, refused rays, short intervals and rays through everything."""
+    bvh = _cpu.Bvh(*soup(6000, 5))
+    origins, directions = random_rays(160, 6, 0.0, 1.0)
+    origins[::5] = 1e6
+    directions[1::5] = np.nan
+    tmax = np.where(np.arange(160) % 5 == 2, 1e-3, np.inf).astype(np.float32)
+    tmin = np.where(np.arange(160) % 5 == 3, 0.5, -np.inf).astype(np.float32)
+    reference = cpu_answers(bvh, "scalar", origins, directions, tmin, tmax)
+    assert len(np.unique(reference.steps[:, 0])) > 10
+    assert_bit_identical(warp_answers(bvh, lanes, origins, directions, tmin, tmax), reference)
+
+
+@pytest.mark.parametrize("nodes", FORMS)
+@pytest.mark.parametrize("accuracy", ACCURACIES)
+@pytest.mark.parametrize("mesh", HARD_MESHES)
+def test_hard_rays_give_the_same_bits_in_every_form(mesh: str, accuracy: str, nodes: str) -> None:
+    vertices, faces = HARD_MESHES[mesh]()
+    bvh = _cpu.Bvh(vertices, faces, accuracy, nodes=nodes)
+    origins, directions = hard_rays(vertices, faces) if len(faces) else random_rays(50, 8)
+    tmin = np.full(1, -np.inf, np.float32)  # behind the origin, too: t of either sign
+    reference = cpu_answers(bvh, "scalar", origins, directions, tmin)
+    for lanes in (8, 1):
+        assert_bit_identical(warp_answers(bvh, lanes, origins, directions, tmin), reference)
+
+
+def test_empty_and_exact_intervals_are_kept_to() -> None:
+    bvh = _cpu.Bvh(*HARD_MESHES["one triangle"]())
+    origins = np.tile(np.float32([0.25, 0.25, 0]), (6, 1))
+    directions = np.tile(np.float32([0, 0, 1]), (6, 1))
+    tmin = np.float32([0, 1, 2, 1, 0, np.nan])
+    tmax = np.float32([1, 1, 1, 0, 0.999, 5])
+    for lanes in (8, 1):
+        found = warp_answers(bvh, lanes, origins, directions, tmin, tmax)
+        np.testing.assert_array_equal(found.prim, [0, 0, -1, -1, -1, -1])
+        np.testing.assert_array_equal(found.occluded, [True, True, False, False, False, False])
+
+
+@pytest.mark.parametrize("lanes", [8, 1])
+def test_closed_sphere_never_leaks_at_vertices_and_edges(lanes: int) -> None:
+    vertices, faces = sphere(4)
+    shift = np.float32([148376, 1234, -223423])
+    middles = vertices[faces][:, :2].mean(axis=1)
+    for offset in (np.float32([0, 0, 0]), shift):
+        moved = vertices + offset
+        aims = np.concatenate([moved, (middles + offset).astype(np.float32)])
+        if lanes == 1:
+            aims = aims[::10]
+        origins = np.tile(offset, (len(aims), 1))
+        found = warp_answers(_cpu.Bvh(moved, faces), lanes, origins, aims - origins)
+        assert (found.prim >= 0).all() and found.occluded.all()

@@ -1,0 +1,1 @@
+"""Functions for users' own kernels, and their gradients."""

@@ -1,0 +1,1 @@
+"""Lane vectors, their collectives, and native code."""

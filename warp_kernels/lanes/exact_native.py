@@ -1,0 +1,200 @@
+"""Native code of the exact triangle test: the filter of triangle_exact.h, and the core's own integers.
+
+The text of the integers is compiled into `wive._cpu`, which gives it to both sides, so there is one of it.
+"""
+
+# mypy: ignore-errors
+# Warp compiles these functions: to mypy they are no Python.
+
+import warp as wp
+
+from wive import _cpu
+
+# A triangle is given by the words at which its vertices begin, their axes `stride` words apart.
+
+# One triangle against the ray's line in double, as cpu/traverse/triangle_exact.h. The error is that of
+# docs/accuracy.md; fused multiply-adds only make it smaller.
+_FILTER = """
+    struct Filter {
+        double weight[3], z[3], low, high, depth_near, depth_far, along, error;
+
+        Filter(const float* tree, wp::vec_t<3, int> at, int stride, wp::vec_t<3, int> axes,
+               wp::vec_t<3, float> origin, double shear_x, double shear_y) {
+            double x[3], y[3];
+            for (int k = 0; k < 3; ++k) {
+                const float* corner = tree + at[k];
+                z[k] = (double)corner[stride * axes[2]] - (double)origin[axes[2]];
+                x[k] = ((double)corner[stride * axes[0]] - (double)origin[axes[0]]) - shear_x * z[k];
+                y[k] = ((double)corner[stride * axes[1]] - (double)origin[axes[1]]) - shear_y * z[k];
+            }
+            double aside = 0.0;
+            for (int k = 0; k < 3; ++k) {
+                const int i = (k + 1) % 3, j = (k + 2) % 3;
+                weight[k] = x[i] * y[j] - y[i] * x[j];
+                const double ax = x[k] < 0.0 ? -x[k] : x[k], ay = y[k] < 0.0 ? -y[k] : y[k];
+                aside = ax > aside ? ax : aside;
+                aside = ay > aside ? ay : aside;
+            }
+            low = lower(lower(weight[0], weight[1]), weight[2]);
+            high = -lower(lower(-weight[0], -weight[1]), -weight[2]);
+            depth_near = lower(lower(z[0], z[1]), z[2]);
+            depth_far = -lower(lower(-z[0], -z[1]), -z[2]);
+            along = -lower(depth_near, -depth_far);
+            const double e = 1.1102230246251565e-16;  // 2^-53
+            error = (aside + 4.0 * e * along) * (13.0 * e * aside + 21.0 * e * along);
+        }
+        static double lower(double a, double b) { return a < b ? a : b; }
+    };
+"""
+
+# NaN, an unused lane of a float32 block, passes no comparison.
+_MAY_MEET = (
+    _FILTER
+    + """
+    const Filter filter((const float*)units, at, stride, axes, origin, shear_x, shear_y);
+    return -filter.error <= filter.low || filter.high <= filter.error;
+"""
+)
+
+_SETUP = (
+    _cpu.exact_source
+    + """
+    const float from[3] = {origin[0], origin[1], origin[2]};
+    const float way[3] = {direction[0], direction[1], direction[2]};
+    float corners[9];
+    for (int i = 0; i < 9; ++i) corners[i] = ((const float*)units)[at[i / 3] + stride * (i % 3)];
+"""
+)
+
+# t, u, v and 1, or a miss: 0 last.
+_SOLVE = (
+    _FILTER
+    + """
+    const Filter filter((const float*)units, at, stride, axes, origin, shear_x, shear_y);
+    const double e = 1.1102230246251565e-16;
+    const bool on_edge = filter.low <= filter.error && -filter.error <= filter.high;  // maybe
+    bool doubt = on_edge;
+    const double share = 1.0 / (filter.weight[0] + filter.weight[1] + filter.weight[2]);
+    const double weight_error = 6.0 * filter.error * (share < 0.0 ? -share : share);
+    double depth = 0.0;
+    for (int k = 0; k < 3; ++k) depth += filter.weight[k] * filter.z[k];
+    depth *= share;
+    const double extent = filter.depth_far - filter.depth_near;
+    const double depth_error = weight_error * extent + 12.0 * e * filter.along;
+    const double values[3] = {depth * inverse, filter.weight[1] * share, filter.weight[2] * share};
+    const double errors[3] = {depth_error * (inverse < 0.0 ? -inverse : inverse), weight_error, weight_error};
+    wp::vec_t<4, float> hit;
+    for (int i = 0; i < 3; ++i) {
+        const float below = (float)(values[i] - errors[i]), above = (float)(values[i] + errors[i]);
+        doubt = doubt || !(below == above);
+        hit[i] = below + 0.0f;
+        // Most doubts are about where a ray meets the surface that it leaves from, which does not matter.
+        if (i == 0 && !on_edge && (above < tmin || below > farthest)) {
+            hit[3] = 0.0f;
+            return hit;
+        }
+    }
+    hit[3] = 1.0f;
+    if (!doubt) return hit;
+"""
+    + _SETUP
+    + """
+    const Meeting meeting(from, way, corners, Meeting::unit_of(from, corners));
+    hit[3] = (crossings ? meeting.crosses : meeting.hit) ? 1.0f : 0.0f;
+    if (hit[3] == 0.0f) return hit;
+    hit[0] = meeting.t();
+    hit[1] = meeting.u();
+    hit[2] = meeting.v();
+    return hit;
+"""
+)
+
+# Rounding keeps order, so only where t rounds to a limit can it have crossed it. t is finite, limits need
+# not be.
+_WITHIN = (
+    """
+    if (t < tmin || t > tmax) return false;
+    const bool at_tmin = t == tmin && t - t == 0.0f, at_tmax = t == tmax && t - t == 0.0f;
+    if (!at_tmin && !at_tmax) return !(t == tmin && t > 0.0f) && !(t == tmax && t < 0.0f);
+"""
+    + _SETUP
+    + """
+    const Meeting meeting(from, way, corners, Meeting::unit_of(from, corners));
+    return !(at_tmin && meeting.compare(tmin) < 0) && !(at_tmax && meeting.compare(tmax) > 0);
+"""
+)
+
+_COMPARE = (
+    _SETUP
+    + """
+    float others[9];
+    for (int i = 0; i < 9; ++i) others[i] = ((const float*)units)[other[i / 3] + other_stride * (i % 3)];
+    const int unit = Meeting::unit_of(from, others, Meeting::unit_of(from, corners));
+    return Meeting(from, way, corners, unit).compare(Meeting(from, way, others, unit));
+"""
+)
+
+
+@wp.func_native(_MAY_MEET)
+def may_meet(
+    units: wp.uint64,
+    at: wp.vec3i,
+    stride: int,
+    axes: wp.vec3i,
+    origin: wp.vec3,
+    shear_x: wp.float64,
+    shear_y: wp.float64,
+) -> bool:
+    """Whether the ray's line is not certain to miss a triangle."""
+    ...
+
+
+@wp.func_native(_SOLVE)
+def solve_exactly(
+    units: wp.uint64,
+    at: wp.vec3i,
+    stride: int,
+    axes: wp.vec3i,
+    origin: wp.vec3,
+    direction: wp.vec3,
+    shear_x: wp.float64,
+    shear_y: wp.float64,
+    inverse: wp.float64,
+    tmin: float,
+    farthest: float,
+    crossings: bool,
+) -> wp.vec4:
+    """t, u and v of a triangle, correctly rounded, and 1; a 0 last where the line misses it.
+
+    Or where it certainly meets it outside [tmin, farthest]; what is in doubt there is not missed.
+    """
+    ...
+
+
+@wp.func_native(_WITHIN)
+def lies_within(
+    units: wp.uint64,
+    at: wp.vec3i,
+    stride: int,
+    origin: wp.vec3,
+    direction: wp.vec3,
+    t: float,
+    tmin: float,
+    tmax: float,
+) -> bool:
+    """Whether the exact t of a triangle, which rounds to t, lies in [tmin, tmax]."""
+    ...
+
+
+@wp.func_native(_COMPARE)
+def compare_distances(
+    units: wp.uint64,
+    at: wp.vec3i,
+    stride: int,
+    other: wp.vec3i,
+    other_stride: int,
+    origin: wp.vec3,
+    direction: wp.vec3,
+) -> int:
+    """The sign of the difference of two triangles' t."""
+    ...

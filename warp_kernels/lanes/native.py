@@ -1,0 +1,263 @@
+"""The native code of what lanes do: intrinsics on CUDA, plain C++ on Warp's CPU device."""
+
+# Eight threads are one group, aligned within their warp.
+_GROUP_MASK = "const unsigned group = 0xffu << (threadIdx.x & 24u);"
+
+# Every fiber of the group writes its value, waits, reads all eight, and waits before anyone writes again.
+_EXCHANGE = """
+    static unsigned values[WP_TILE_BLOCK_DIM];
+    const int thread = WP_TILE_THREAD_IDX;
+    values[thread] = x;
+    WP_TILE_SYNC();
+    unsigned all = values[thread & ~7];
+    for (int i = 1; i < 8; ++i) { const unsigned y = values[(thread & ~7) + i]; all = COMBINE; }
+    WP_TILE_SYNC();
+    return all;
+"""
+
+
+def _reduce(cuda: str, combine: str) -> str:
+    """Native code that reduces the unsigned x of a group; CUDA has it as one instruction since sm_80."""
+    return f"""
+#if defined(__CUDA_ARCH__)
+    {_GROUP_MASK}
+#if __CUDA_ARCH__ >= 800
+    return {cuda}(group, x);
+#else
+    unsigned all = x;
+    for (int step = 4; step; step >>= 1) {{
+        const unsigned y = __shfl_xor_sync(group, all, step, 8);
+        all = {combine};
+    }}
+    return all;
+#endif
+#else
+    {_EXCHANGE.replace("COMBINE", combine)}
+#endif
+"""
+
+
+OR_REDUCE = _reduce("__reduce_or_sync", "all | y")
+MIN_REDUCE = _reduce("__reduce_min_sync", "y < all ? y : all")
+ADD_REDUCE = _reduce("__reduce_add_sync", "all + y")
+
+SYNC = f"""
+#if defined(__CUDA_ARCH__)
+    {_GROUP_MASK}
+    __syncwarp(group);
+#else
+    WP_TILE_SYNC();
+#endif
+"""
+
+# A row of the node against the ray: plane * rdir + bias. CUDA fuses the two; a row is two loads of 16 bytes
+# there.
+DISTANCES_8 = """
+    const float* row = (const float*)units + at;
+    wp::vec_t<8, wp::float32> distances;
+#if defined(__CUDA_ARCH__)
+    const float4 a = __ldg((const float4*)row), b = __ldg((const float4*)row + 1);
+    distances[0] = __fmaf_rn(a.x, rdir, bias); distances[1] = __fmaf_rn(a.y, rdir, bias);
+    distances[2] = __fmaf_rn(a.z, rdir, bias); distances[3] = __fmaf_rn(a.w, rdir, bias);
+    distances[4] = __fmaf_rn(b.x, rdir, bias); distances[5] = __fmaf_rn(b.y, rdir, bias);
+    distances[6] = __fmaf_rn(b.z, rdir, bias); distances[7] = __fmaf_rn(b.w, rdir, bias);
+#else
+    for (int i = 0; i < 8; ++i) distances[i] = row[i] * rdir + bias;
+#endif
+    return distances;
+"""
+DISTANCES_1 = """
+    const float* row = (const float*)units + at + lane;
+#if defined(__CUDA_ARCH__)
+    return wp::vec_t<1, wp::float32>(__fmaf_rn(__ldg(row), rdir, bias));
+#else
+    return wp::vec_t<1, wp::float32>(*row * rdir + bias);
+#endif
+"""
+
+# The same row as it is, for children and ranks.
+ROW_8 = """
+    const float* row = (const float*)units + at;
+    wp::vec_t<8, wp::uint32> words;
+#if defined(__CUDA_ARCH__)
+    const uint4 a = __ldg((const uint4*)row), b = __ldg((const uint4*)row + 1);
+    words[0] = a.x; words[1] = a.y; words[2] = a.z; words[3] = a.w;
+    words[4] = b.x; words[5] = b.y; words[6] = b.z; words[7] = b.w;
+#else
+    for (int i = 0; i < 8; ++i) words[i] = ((const wp::uint32*)row)[i];
+#endif
+    return words;
+"""
+ROW_1 = """
+    const wp::uint32* row = (const wp::uint32*)units + at + lane;
+#if defined(__CUDA_ARCH__)
+    return wp::vec_t<1, wp::uint32>(__ldg(row));
+#else
+    return wp::vec_t<1, wp::uint32>(*row);
+#endif
+"""
+
+# The same distances where planes are bytes on a grid: byte * (step * rdir) + (origin * rdir + bias). A node
+# begins with origin and step; its rows of eight bytes follow them.
+BYTE_DISTANCES_8 = """
+    const float* words = (const float*)units + node;
+    wp::vec_t<8, wp::float32> distances;
+#if defined(__CUDA_ARCH__)
+    const float step = __fmul_rn(__ldg(words + 3 + axis), rdir);
+    const float base = __fmaf_rn(__ldg(words + axis), rdir, bias);
+    const uint2 bytes = __ldg((const uint2*)(words + 6) + row);
+    for (int i = 0; i < 4; ++i) {
+        distances[i] = __fmaf_rn((float)(bytes.x >> 8 * i & 255u), step, base);
+        distances[4 + i] = __fmaf_rn((float)(bytes.y >> 8 * i & 255u), step, base);
+    }
+#else
+    const float step = words[3 + axis] * rdir, base = words[axis] * rdir + bias;
+    const unsigned char* bytes = (const unsigned char*)(words + 6) + 8 * row;
+    for (int i = 0; i < 8; ++i) distances[i] = (float)bytes[i] * step + base;
+#endif
+    return distances;
+"""
+BYTE_DISTANCES_1 = """
+    const float* words = (const float*)units + node;
+    const unsigned char* byte = (const unsigned char*)(words + 6) + 8 * row + lane;
+#if defined(__CUDA_ARCH__)
+    const float base = __fmaf_rn(__ldg(words + axis), rdir, bias);
+    const float step = __fmul_rn(__ldg(words + 3 + axis), rdir);
+    return wp::vec_t<1, wp::float32>(__fmaf_rn((float)__ldg(byte), step, base));
+#else
+    return wp::vec_t<1, wp::float32>((float)*byte * (words[3 + axis] * rdir) + (words[axis] * rdir + bias));
+#endif
+"""
+
+# Lanes of three bytes, the fourth being whatever comes behind.
+RANKS_8 = """
+    const unsigned* row = (const unsigned*)units + node + 18;
+    wp::vec_t<8, wp::uint32> ranks;
+    for (int half = 0; half < 2; ++half) {
+#if defined(__CUDA_ARCH__)
+        const unsigned a = __ldg(row + 3 * half), b = __ldg(row + 3 * half + 1);
+        const unsigned c = __ldg(row + 3 * half + 2);
+#else
+        const unsigned a = row[3 * half], b = row[3 * half + 1], c = row[3 * half + 2];
+#endif
+        ranks[4 * half] = a;
+        ranks[4 * half + 1] = a >> 24 | b << 8;
+        ranks[4 * half + 2] = b >> 16 | c << 16;
+        ranks[4 * half + 3] = c >> 8;
+    }
+    return ranks;
+"""
+RANKS_1 = """
+    const unsigned char* bytes = (const unsigned char*)((const unsigned*)units + node + 18) + 3 * lane;
+#if defined(__CUDA_ARCH__)
+    return wp::vec_t<1, wp::uint32>(__ldg(bytes) | __ldg(bytes + 1) << 8 | __ldg(bytes + 2) << 16);
+#else
+    return wp::vec_t<1, wp::uint32>(bytes[0] | bytes[1] << 8 | bytes[2] << 16);
+#endif
+"""
+
+# Of a row of shared vertices, those of four triangles, numbered by four bits each, or that of the lane's own.
+PICK_4 = """
+    const float* from = (const float*)units + row;
+    wp::vec_t<4, wp::float32> picked;
+    for (int i = 0; i < 4; ++i) {
+#if defined(__CUDA_ARCH__)
+        picked[i] = __ldg(from + (numbers >> 4 * i & 7u));
+#else
+        picked[i] = from[numbers >> 4 * i & 7u];
+#endif
+    }
+    return picked;
+"""
+PICK_1 = """
+    const float* from = (const float*)units + row + (numbers >> 4 * (lane & 3) & 7u);
+#if defined(__CUDA_ARCH__)
+    return wp::vec_t<1, wp::float32>(__ldg(from));
+#else
+    return wp::vec_t<1, wp::float32>(*from);
+#endif
+"""
+
+# Four triangles' worth of a row of a block, or the lane's own.
+TRIANGLES_4 = """
+    const float* row = (const float*)units + at;
+#if defined(__CUDA_ARCH__)
+    const float4 a = __ldg((const float4*)row);
+    return wp::vec_t<4, wp::float32>(a.x, a.y, a.z, a.w);
+#else
+    return wp::vec_t<4, wp::float32>(row[0], row[1], row[2], row[3]);
+#endif
+"""
+
+DOUBLE_TRIANGLES_4 = """
+    const double* row = (const double*)((const float*)units + at);
+#if defined(__CUDA_ARCH__)
+    const double2 a = __ldg((const double2*)row), b = __ldg((const double2*)row + 1);
+    return wp::vec_t<4, wp::float64>(a.x, a.y, b.x, b.y);
+#else
+    return wp::vec_t<4, wp::float64>(row[0], row[1], row[2], row[3]);
+#endif
+"""
+
+# Products that no compiler may fuse with an addition, whatever the options of the module they end up in:
+# fused, the two triangles at an edge would not compute the same numbers.
+PRODUCT = """
+#if defined(__CUDA_ARCH__)
+    return ROUNDED(a, b);
+#else
+    return a * b;
+#endif
+"""
+PRODUCTS = """
+    wp::vec_t<LENGTH, wp::REAL> c;
+#if defined(__CUDA_ARCH__)
+    for (int i = 0; i < LENGTH; ++i) c[i] = ROUNDED(a[i], b[i]);
+#else
+    for (int i = 0; i < LENGTH; ++i) c[i] = a[i] * b[i];
+#endif
+    return c;
+"""
+
+# x1 y2 - y1 x2 with the exact sign, as cpu/traverse/triangle_watertight_float64.h.
+EXACT_WEIGHT = """
+#if defined(__CUDA_ARCH__)
+    const double a = __dmul_rn(x1, y2), b = __dmul_rn(y1, x2);
+#else
+    const double a = x1 * y2, b = y1 * x2;
+#endif
+    const double a_low = fma(x1, y2, -a), b_low = -fma(y1, x2, -b);
+    const double low = a_low + b_low, b_part = low - a_low;
+    const double lowest = (a_low - (low - b_part)) + (b_low - b_part);
+    return ((a - b) + low) + lowest;
+"""
+
+# A hit goes to the last free place of its ray's, and the number of those falls. It does not fall below zero:
+# memory stays whole even where rays were overwritten since their hits were counted. On the CPU device a ray's
+# fibers take turns.
+LIST_HIT = """
+#if defined(__CUDA_ARCH__)
+    const int place = atomicSub((int*)left, 1) - 1;
+    if (place < 0) { atomicAdd((int*)left, 1); return; }
+#else
+    if (*(const int*)left <= 0) return;
+    const int place = --*(int*)left;
+#endif
+    REAL* hit = (REAL*)hits + 4 * (wp::int64)place;
+    hit[0] = t;
+    hit[1] = u;
+    hit[2] = v;
+    *(int*)(hit + 3) = prim;
+"""
+
+
+def shared_stack_code(words: int) -> str:
+    """Native code for a group's piece of the stack that the groups of a block share, `words` of 32 bits."""
+    return f"""
+#if defined(__CUDA_ARCH__)
+    __shared__ unsigned stack[(WP_TILE_BLOCK_DIM + 7) / 8][{words}];
+    return (wp::uint64)&stack[threadIdx.x >> 3][0];
+#else
+    static unsigned stack[(WP_TILE_BLOCK_DIM + 7) / 8][{words}];
+    return (wp::uint64)&stack[WP_TILE_THREAD_IDX >> 3][0];
+#endif
+"""

@@ -1,0 +1,85 @@
+"""The two kinds of numbers that a mesh's vertices and its rays may hold: float32 and float64.
+
+Boxes are float32 in both (docs/accuracy.md): the ray, the triangle tests and t, u, v follow the numbers.
+"""
+
+from types import SimpleNamespace
+
+# mypy: ignore-errors
+# Warp compiles these functions: to mypy they are no Python.
+import warp as wp
+
+from wive.warp_kernels.lanes.lanes import (
+    load_double,
+    load_float,
+    product,
+    product_double,
+    without_gradient,
+)
+
+# words: of 32 bits in a number. product: of two numbers, never fused with an addition.
+PRECISIONS = {
+    "float32": SimpleNamespace(
+        name="float32",
+        real=wp.float32,
+        vec2=wp.vec2,
+        vec3=wp.vec3,
+        words=1,
+        load=load_float,
+        product=product,
+    ),
+    "float64": SimpleNamespace(
+        name="float64",
+        real=wp.float64,
+        vec2=wp.vec2d,
+        vec3=wp.vec3d,
+        words=2,
+        load=load_double,
+        product=product_double,
+    ),
+}
+
+
+def precision_of(array: wp.array) -> str:
+    """That of an array of numbers or vectors."""
+    return "float64" if array.dtype in (wp.float64, wp.vec2d, wp.vec3d) else "float32"
+
+
+def kept_numbers(lanes: SimpleNamespace, precision: str, kept: int) -> SimpleNamespace:
+    """`store` and `load` of the i-th number from word `kept` of the stack on, and of three at once."""
+    store_word, load_word, stack_argument = lanes.store_word, lanes.load_word, lanes.stack_argument
+    vec3 = PRECISIONS[precision].vec3
+
+    if precision == "float32":
+
+        @without_gradient
+        @wp.func
+        def store(stack: stack_argument, i: int, x: float):
+            store_word(stack, kept + i, wp.cast(x, wp.uint32))
+
+        @without_gradient
+        @wp.func
+        def load(stack: stack_argument, i: int):
+            return wp.cast(load_word(stack, kept + i), wp.float32)
+
+    else:
+
+        @without_gradient
+        @wp.func
+        def store(stack: stack_argument, i: int, x: wp.float64):
+            bits = wp.cast(x, wp.uint64)
+            store_word(stack, kept + 2 * i, wp.uint32(bits & wp.uint64(0xFFFFFFFF)))
+            store_word(stack, kept + 2 * i + 1, wp.uint32(bits >> wp.uint64(32)))
+
+        @without_gradient
+        @wp.func
+        def load(stack: stack_argument, i: int):
+            high = wp.uint64(load_word(stack, kept + 2 * i + 1))
+            return wp.cast(wp.uint64(load_word(stack, kept + 2 * i)) | (high << wp.uint64(32)), wp.float64)
+
+    @without_gradient
+    @wp.func
+    def load_vector(stack: stack_argument, first: int):
+        return vec3(load(stack, first), load(stack, first + 1), load(stack, first + 2))
+
+    return SimpleNamespace(store=store, load=load, load_vector=load_vector)

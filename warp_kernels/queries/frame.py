@@ -1,0 +1,210 @@
+"""A ray made ready for traversal, as in frame.h: checked, scaled, reciprocal and slab offsets taken."""
+
+# mypy: ignore-errors
+# Warp compiles these functions: to mypy they are no Python.
+
+import warp as wp
+
+from wive.warp_kernels.lanes.precision import PRECISIONS
+from wive.warp_kernels.tree.handle import SIGN_BIT
+
+MAX_COORDINATE = 1e18
+MAX_FLOAT = 3.4028234663852886e38
+MAX_DOUBLE = 1.7976931348623157e308
+SMALLEST_PART = wp.constant(wp.float32(2.0**-30))
+LEAST_REACH = wp.constant(wp.float32(2.0**-100))
+SLACK_FACTOR = wp.constant(wp.float32(2.0**-20))
+
+
+@wp.struct
+class RayFrame:
+    """See cpu/traverse/frame.h for what each is and why it is enough."""
+
+    origin: wp.vec3
+    direction: wp.vec3  # scaled by a power of two: its longest component lies in [1, 2)
+    rdir: wp.vec3
+    near_bias: wp.vec3
+    far_bias: wp.vec3
+    tmin: wp.float32
+    tmax: wp.float32
+    scale: wp.float32  # t of the caller's ray = scale * t here
+    octant: wp.int32  # bit a: negative on axis a, from the sign of the reciprocal
+    longest_axis: wp.int32
+    given_direction: wp.vec3  # as the caller gave them: exact trees alone need these three
+    given_tmin: wp.float32
+    given_tmax: wp.float32
+    valid: wp.bool  # false where the ray hits nothing by rule
+
+
+@wp.struct
+class RayFrame64:
+    """The same in a float64 tree: the ray in double, and for boxes in float32 what is not the ray's own."""
+
+    origin: wp.vec3d
+    direction: wp.vec3d
+    rdir: wp.vec3
+    near_bias: wp.vec3
+    far_bias: wp.vec3
+    tmin: wp.float64
+    tmax: wp.float64
+    box_tmin: wp.float32  # tmin rounded down
+    scale: wp.float64
+    octant: wp.int32
+    longest_axis: wp.int32
+    valid: wp.bool
+
+
+@wp.func
+def is_negative(x: float):
+    """Whether the sign bit is set: true of -0.0."""
+    return wp.cast(x, wp.int32) < 0
+
+
+@wp.func
+def is_negative(x: wp.float64):  # noqa: D103, F811
+    return wp.cast(x, wp.int64) < wp.int64(0)
+
+
+@wp.func
+def flip_sign(x: float, sign: float):
+    """x, negated where `sign` has its sign bit set; by the bit, because Warp's -x is 0 - x and loses -0."""
+    return wp.cast(wp.cast(x, wp.uint32) ^ (wp.cast(sign, wp.uint32) & SIGN_BIT), wp.float32)
+
+
+@wp.func
+def flip_sign(x: wp.float64, sign: wp.float64):  # noqa: D103, F811
+    bit = wp.cast(sign, wp.uint64) & wp.uint64(0x8000000000000000)
+    return wp.cast(wp.cast(x, wp.uint64) ^ bit, wp.float64)
+
+
+@wp.func
+def component(v: wp.vec3, axis: int):
+    """v[axis] by selection: an index unknown to the compiler would put v into memory."""
+    return wp.where(axis == 0, v[0], wp.where(axis == 1, v[1], v[2]))
+
+
+@wp.func
+def component(v: wp.vec3d, axis: int):  # noqa: D103, F811
+    return wp.where(axis == 0, v[0], wp.where(axis == 1, v[1], v[2]))
+
+
+@wp.func
+def next_above(x: float):
+    """The next number above x, which is not infinity."""
+    bits = wp.cast(x, wp.int32)
+    smallest = wp.cast(1, wp.float32)
+    return wp.where(x == 0.0, smallest, wp.cast(wp.where(bits < 0, bits - 1, bits + 1), wp.float32))
+
+
+@wp.func
+def box_tmax(t: float):
+    """What boxes take for the ray's t: here the same."""
+    return t
+
+
+@wp.func
+def box_tmax(t: wp.float64):  # noqa: D103, F811
+    rounded = wp.float32(t)
+    if wp.float64(rounded) < t:
+        rounded = next_above(rounded)
+    return rounded
+
+
+@wp.func
+def box_tmin(ray: RayFrame):
+    """The same of the ray's tmin."""
+    return ray.tmin
+
+
+@wp.func
+def box_tmin(ray: RayFrame64):  # noqa: D103, F811
+    return ray.box_tmin
+
+
+@wp.func
+def powers_of(longest: float):
+    """The power of two that brings the longest component to [1, 2), and one over it."""
+    exponent = wp.min(wp.cast(longest, wp.uint32) >> wp.uint32(23), wp.uint32(253))
+    unscale_bits = wp.where(exponent > wp.uint32(0), exponent << wp.uint32(23), wp.uint32(1) << wp.uint32(22))
+    return wp.vec2(
+        wp.cast((wp.uint32(254) - exponent) << wp.uint32(23), wp.float32), wp.cast(unscale_bits, wp.float32)
+    )
+
+
+@wp.func
+def powers_of(longest: wp.float64):  # noqa: D103, F811
+    exponent = wp.min(wp.cast(longest, wp.uint64) >> wp.uint64(52), wp.uint64(2045))
+    unscale_bits = wp.where(exponent > wp.uint64(0), exponent << wp.uint64(52), wp.uint64(1) << wp.uint64(51))
+    return wp.vec2d(
+        wp.cast((wp.uint64(2046) - exponent) << wp.uint64(52), wp.float64), wp.cast(unscale_bits, wp.float64)
+    )
+
+
+@wp.func
+def axes_of(longest: int):
+    """The axes in the order of the triangle tests' sheared space, the direction's longest last."""
+    x = wp.where(longest == 2, 0, longest + 1)
+    return wp.vec3i(x, wp.where(x == 2, 0, x + 1), longest)
+
+
+def make_load_frame(precision: str, frame_type: type) -> wp.Function:
+    """The function that makes a ray of that precision ready."""
+    numbers = PRECISIONS[precision]
+    real, vec3 = numbers.real, numbers.vec3
+    double: bool = precision == "float64"
+    max_coordinate = real(MAX_COORDINATE)
+    max_component = real(MAX_DOUBLE if double else MAX_FLOAT)
+
+    @wp.func
+    def load_frame(center: wp.vec3, extent: wp.vec3, origin: vec3, direction: vec3, tmin: real, tmax: real):
+        """The frame of a ray in a tree with this center and extent."""
+        ray = frame_type()
+        lengths = vec3(wp.abs(direction[0]), wp.abs(direction[1]), wp.abs(direction[2]))
+        longest = wp.max(wp.max(lengths[0], lengths[1]), lengths[2])
+        ray.valid = longest > real(0.0) and tmin <= tmax
+        for axis in range(3):
+            if not (wp.abs(origin[axis]) <= max_coordinate and lengths[axis] <= max_component):
+                ray.valid = False
+
+        powers = powers_of(longest)
+        ray.scale = powers[0]
+        ray.tmin = tmin * powers[1]
+        ray.tmax = tmax * powers[1]
+        ray.origin = origin
+        ray.direction = direction * ray.scale
+        scaled = wp.vec3()
+        relative = wp.vec3()
+        for axis in range(3):
+            scaled[axis] = wp.float32(ray.direction[axis])
+            relative[axis] = wp.float32(origin[axis] - real(center[axis]))
+        if wp.static(double):
+            ray.box_tmin = -box_tmax(-ray.tmin)
+        else:
+            ray.given_direction = direction
+            ray.given_tmin = tmin
+            ray.given_tmax = tmax
+
+        reach = float(0.0)  # noqa: UP018
+        for axis in range(3):
+            reach = wp.max(reach, extent[axis] + wp.abs(relative[axis]))
+        reach = reach + LEAST_REACH
+        smallest = wp.float32(longest * ray.scale) * SMALLEST_PART
+        for axis in range(3):
+            size = 1.0 / wp.max(wp.abs(scaled[axis]), smallest)
+            reciprocal = flip_sign(size, scaled[axis])
+            distance = relative[axis] * reciprocal
+            slack = size * (reach * SLACK_FACTOR)
+            ray.rdir[axis] = reciprocal
+            ray.near_bias[axis] = 0.0 - (distance + slack)
+            ray.far_bias[axis] = slack - distance
+            if is_negative(ray.direction[axis]):
+                ray.octant = ray.octant | (1 << axis)
+        ray.longest_axis = wp.where(lengths[0] == longest, 0, wp.where(lengths[1] == longest, 1, 2))
+        return ray
+
+    return load_frame
+
+
+FRAMES = {"float32": RayFrame, "float64": RayFrame64}
+LOAD_FRAME = {precision: make_load_frame(precision, frame) for precision, frame in FRAMES.items()}
+load_frame = LOAD_FRAME["float32"]

@@ -1,0 +1,1 @@
+"""Backend "warp" of wive.Scene: queries, results computed on the device, pictures."""

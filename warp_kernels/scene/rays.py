@@ -1,0 +1,168 @@
+"""Rays as Warp arrays on the scene's device: checked, and shared with their owner rather than copied."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import warp as wp
+
+from wive._internal import arguments
+from wive._internal.arrays import NUMPY, library_of
+from wive._internal.precision import Floats, real_named
+from wive._internal.rays import Rays
+from wive.warp_kernels.lanes.precision import PRECISIONS, precision_of
+
+# Limits that nearly every call has: made once for a scene, they cost a call nothing.
+COMMON_LIMITS = (0.0, float("inf"))
+
+
+@dataclass(frozen=True)
+class WarpRays:
+    """Origins and directions (n,) vec3, tmin and tmax (1,) or (n,) float32, on one device.
+
+    For a float64 scene vec3d and float64.
+    """
+
+    origins: Any
+    directions: Any
+    tmin: Any
+    tmax: Any
+
+    def __len__(self) -> int:
+        """Number of rays."""
+        return len(self.origins)
+
+
+class RayLoader:
+    """Turns what users pass into `WarpRays` of one precision on one device."""
+
+    def __init__(self, device: str, precision: str = "float32") -> None:
+        """Make the common limits."""
+        self.device = device
+        self.precision = precision
+        self._dtype = real_named(precision)
+        numbers = PRECISIONS[precision]
+        self._real, self._vec3, self._bytes = numbers.real, numbers.vec3, 4 * numbers.words
+        self._common = {value: wp.full(1, value, dtype=self._real, device=device) for value in COMMON_LIMITS}
+
+    def from_numpy(self, rays: Rays) -> WarpRays:
+        """Checked as for every backend; copied only where the device is not the host."""
+        origins, directions, tmin, tmax = rays.numpy(self._dtype)
+        return WarpRays(
+            wp.array(origins, dtype=self._vec3, device=self.device, copy=False),
+            wp.array(directions, dtype=self._vec3, device=self.device, copy=False),
+            self._limit_of_numpy(tmin),
+            self._limit_of_numpy(tmax),
+        )
+
+    def from_device(self, rays: Rays) -> WarpRays:
+        """Arrays on this device, of the scene's type as they are; nothing of them goes through the host."""
+        origins, one_origin = self._vectors("origins", rays.origins)
+        directions, one_direction = self._vectors("directions", rays.directions)
+        count = len(directions) if one_origin else len(origins)
+        if not one_direction and len(directions) != count:
+            raise ValueError(
+                f"origins and directions must be equally many, got {count} and {len(directions)}"
+            )
+        return WarpRays(
+            _view(origins, count, 0) if one_origin else origins,
+            _view(directions, count, 0) if one_direction else directions,
+            self._limit("tmin", rays.tmin, count),
+            self._limit("tmax", rays.tmax, count),
+        )
+
+    def directions(self, value: Any, count: int) -> Any:
+        """(count,) vec3 of directions (count,3), or (3,) for all; NumPy's are copied to the device."""
+        library = library_of(value)
+        if library is NUMPY:
+            rows = arguments.directions(value, count, self._dtype)
+            if rows.strides[0] == 0:
+                one = wp.array(rows[:1], dtype=self._vec3, device=self.device)
+                return _view(one, count, 0)
+            return wp.array(rows, dtype=self._vec3, device=self.device, copy=False)
+        place = library.device(value)
+        if place not in (self.device, None if self.device != "cpu" else self.device):
+            raise ValueError(
+                f"directions must be on the device of the hits, {self.device}, got an array on {place}: "
+                "copy it there"
+            )
+        array, shared = self._vectors("directions", value)
+        if shared:
+            return _view(array, count, 0)
+        if len(array) != count:
+            raise ValueError(
+                f"directions must have shape ({count}, 3), one a hit, or (3,), got {(len(array), 3)}"
+            )
+        return array
+
+    def _vectors(self, name: str, value: Any) -> tuple[Any, bool]:
+        """(n,) vec3 and False, or the (1,) that all rays share and True."""
+        library = library_of(value)
+        if library is NUMPY:
+            return wp.full(1, self._vec3(*map(float, value)), dtype=self._vec3, device=self.device), True
+        array = self._checked(name, value)
+        if array.dtype is self._vec3 and array.ndim == 1:
+            return array, False
+        if array.dtype is self._vec3 or array.ndim not in (1, 2) or array.shape[-1] != 3:
+            raise ValueError(
+                f"{name} must have shape (n, 3), or (3,) if all rays share it, got {_shape(array)}"
+            )
+        rows = array if array.strides[-1] == self._bytes else array.contiguous()
+        if array.ndim == 1:
+            return _view(rows, 1, 0), True
+        return _view(rows, len(rows), rows.strides[0]), False
+
+    def _limit(self, name: str, value: Any, count: int) -> Any:
+        """(1,) or (count,) float32."""
+        if type(value) is float and value in self._common:
+            return self._common[value]
+        if library_of(value) is NUMPY:
+            (number,) = arguments.limits(name, value, 1, self._dtype)
+            return self._limit_of_numpy(np.array([number], self.precision))
+        array = self._checked(name, value)
+        if array.shape not in ((1,), (count,)) or array.dtype is not self._real:
+            raise ValueError(
+                f"{name} must be one number or have shape ({count},), one a ray, got shape {_shape(array)}"
+            )
+        return array
+
+    def _limit_of_numpy(self, values: Floats) -> Any:
+        if len(values) == 1 and float(values[0]) in self._common:
+            return self._common[float(values[0])]
+        if len(values) == 1:
+            return wp.full(1, float(values[0]), dtype=self._real, device=self.device)
+        return wp.array(values, dtype=self._real, device=self.device, copy=False)
+
+    def _checked(self, name: str, value: Any) -> Any:
+        """The array as Warp's: of the scene's numbers or of vectors of three."""
+        found: object = getattr(value, "dtype", "another type")
+        try:
+            array = library_of(value).to_warp(value, self.device)
+            if array.dtype in (self._vec3, self._real):
+                return array
+            found = wp.types.type_repr(array.dtype)
+        except (RuntimeError, TypeError, ValueError, BufferError):
+            pass  # a type that Warp has no name for: `found` is what its owner calls it
+        raise TypeError(
+            f"{name} must be {self.precision} on a Warp device, where nothing is converted, got {found}: "
+            "convert it first"
+        )
+
+
+def _view(array: Any, count: int, stride: int) -> Any:
+    """`count` vectors of three over the same memory, `stride` bytes apart."""
+    view = wp.array(
+        ptr=array.ptr,
+        dtype=PRECISIONS[precision_of(array)].vec3,
+        shape=(count,),
+        strides=(stride,),
+        device=array.device,
+        copy=False,
+    )
+    view._owner = array  # lives as long as the view
+    return view
+
+
+def _shape(array: Any) -> tuple[int, ...]:
+    """As its owner sees it: vectors are rows."""
+    return (*array.shape, *getattr(array.dtype, "_shape_", ()))

@@ -1,0 +1,146 @@
+"""Path tracing on a Warp device: the picture of render.cpp, bit for bit, whole wavefronts at a time.
+
+Random numbers come from (pixel, sample, bounce) alone and a pixel's light is added up in a fixed order, so it
+does not matter which device traces, nor in what order paths survive.
+"""
+
+from collections.abc import Iterator
+from typing import Any, Literal
+
+import numpy as np
+import warp as wp
+
+from wive._internal.arguments import Float32
+from wive.warp_kernels import check, launch_closest
+from wive.warp_kernels.scene import shading as warp_shading
+from wive.warp_kernels.scene.tracer import WarpTracer, choose_lanes
+
+# The tile and the wave of cpu/render/render.cpp: they say in which order a pixel's light is added up.
+TILE_WIDTH = 32
+WAVE_SIZE = 4096
+# Paths traced together: what fills a GPU, and some hundred megabytes of it.
+MOST_PATHS = 1 << 20
+
+
+class PictureRenderer:
+    """Renders one picture band by band; what a band leaves behind in memory serves the next."""
+
+    def __init__(
+        self,
+        tracer: WarpTracer,
+        camera: Float32,
+        image: Float32,
+        samples: int,
+        bounces: int,
+        albedo: Literal["gray", "normals"],
+        seed: int,
+    ) -> None:
+        """Arguments as for the core's `render_rows`; image (height,width,3) is written in place."""
+        self._image = image
+        self._samples = samples
+        self._tracer = tracer
+        self._paths = _Paths(tracer, bounces, albedo == "normals")
+        self._frame = warp_shading.Frame()
+        vectors = [wp.vec3(*map(float, vector)) for vector in camera]
+        self._frame.eye, self._frame.centre, self._frame.right, self._frame.up = vectors
+        self._frame.height, self._frame.width = image.shape[:2]
+        self._frame.seed = seed
+
+    def render_rows(self, begin: int, end: int) -> int:
+        """Path-trace rows [begin, end) of the image; returns the rays traced."""
+        frame, samples = self._frame, self._samples
+        width = self._image.shape[1]
+        sums = wp.zeros((end - begin) * width, dtype=wp.vec3, device=self._tracer.device)
+        frame.band_row = begin
+        rays = 0
+        for columns, chunk in _strips(width):
+            frame.first_column, frame.columns = columns.start, len(columns)
+            rows = max(1, MOST_PATHS // (len(columns) * min(chunk, samples)))
+            for first_row in range(begin, end, rows):
+                frame.first_row = first_row
+                pixels = len(columns) * (min(first_row + rows, end) - first_row)
+                for first_sample in range(0, samples, chunk):
+                    frame.first_sample = first_sample
+                    frame.samples = min(chunk, samples - first_sample)
+                    rays += self._paths.trace(frame, pixels, sums)
+        mean = sums.numpy().reshape(-1, width, 3) * (np.float32(1) / np.float32(samples))
+        self._image[begin:end] = mean
+        check(self._tracer.tree)
+        return rays
+
+
+def _strips(width: int) -> Iterator[tuple[range, int]]:
+    """Columns rendered together, and how many samples of a pixel they add up at a time, as the CPU does."""
+    whole = width // TILE_WIDTH * TILE_WIDTH
+    most = MOST_PATHS // WAVE_SIZE * TILE_WIDTH
+    for begin in range(0, whole, most):
+        yield range(begin, min(begin + most, whole)), WAVE_SIZE // TILE_WIDTH
+    if whole < width:
+        yield range(whole, width), WAVE_SIZE // (width - whole)
+
+
+class _Paths:
+    """The state of all paths of a pass, reused by the next."""
+
+    def __init__(self, tracer: WarpTracer, bounces: int, coloured: bool) -> None:
+        self.tracer = tracer
+        self.bounces = bounces
+        self.coloured = coloured
+        self.tmin = wp.zeros(1, dtype=wp.float32, device=tracer.device)
+        self.tmax = wp.full(1, float("inf"), dtype=wp.float32, device=tracer.device)
+        self.alive = wp.zeros(1, dtype=wp.int32, device=tracer.device)
+        self.capacity = -1
+
+    def reserve(self, count: int) -> None:
+        """Room for `count` paths."""
+        if count <= self.capacity:
+            return
+        self.capacity = count
+
+        def array(dtype: Any) -> Any:
+            return wp.empty(count, dtype=dtype, device=self.tracer.device)
+
+        self.throughput, self.last_bounce = array(wp.vec3), array(wp.int32)
+        self.t, self.prim, self.uv = array(wp.float32), array(wp.int32), array(wp.vec2)
+        self.wave = array(wp.int32), array(wp.vec3), array(wp.vec3)
+        self.next_wave = array(wp.int32), array(wp.vec3), array(wp.vec3)
+
+    def trace(self, frame: warp_shading.Frame, pixels: int, sums: Any) -> int:
+        """All samples of a pass: their light into `sums`; returns the rays traced."""
+        device = self.tracer.device
+        count = pixels * frame.samples
+        self.reserve(count)
+        path, origins, directions = self.wave
+        outputs = [path, self.throughput, self.last_bounce, origins, directions]
+        wp.launch(warp_shading.start_paths, count, [frame], outputs, device=device)
+        rays, bounce = 0, 0
+        while count > 0:
+            rays += count
+            self._bounce(frame, bounce, count)
+            self.wave, self.next_wave = self.next_wave, self.wave
+            count = int(self.alive.numpy()[0])
+            bounce += 1
+        light = [frame, bounce, self.throughput, self.last_bounce]
+        wp.launch(warp_shading.gather, pixels, light, [sums], device=device)
+        return rays
+
+    def _bounce(self, frame: warp_shading.Frame, bounce: int, count: int) -> None:
+        """Trace the wave's first `count` rays; what bounces makes the next wave."""
+        device = self.tracer.device
+        path, origins, directions = self.wave
+        launch_closest(
+            self.tracer.tree,
+            origins[:count],
+            directions[:count],
+            self.tmin,
+            self.tmax,
+            self.t[:count],
+            self.prim[:count],
+            self.uv[:count],
+            lanes=choose_lanes(None, count, device != "cpu"),
+        )
+        self.alive.zero_()
+        inputs = [frame, bounce, self.bounces, self.coloured, *self.tracer.mesh()]
+        hits = [self.prim, self.uv, path, directions]
+        outputs = [self.throughput, self.last_bounce, self.alive, *self.next_wave]
+        wp.launch(warp_shading.shade, count, [*inputs, *hits], outputs, device=device)

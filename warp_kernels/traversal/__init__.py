@@ -1,0 +1,1 @@
+"""The traversal loop and its slab test."""

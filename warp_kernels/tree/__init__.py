@@ -1,0 +1,1 @@
+"""The tree on a device: layout, node and block forms, upload."""

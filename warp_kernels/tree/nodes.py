@@ -1,0 +1,60 @@
+"""The two forms of a node, as layout.h and compressed.h: what a visit reads, and for which lanes."""
+
+from types import SimpleNamespace
+
+# mypy: ignore-errors
+# Warp compiles these functions: to mypy they are no Python.
+import warp as wp
+
+from wive.warp_kernels.lanes.native import BYTE_DISTANCES_1, BYTE_DISTANCES_8, RANKS_1, RANKS_8
+from wive.warp_kernels.tree.handle import ALL_BITS, CHILD_ROW, COMPRESSED_CHILD_ROW, RANK_ROW
+
+
+@wp.func
+def _always(child: wp.uint32):
+    return True
+
+
+@wp.func
+def _has_child(child: wp.uint32):
+    return child != ALL_BITS
+
+
+def float32_node(lanes: SimpleNamespace) -> SimpleNamespace:
+    """Rows of floats; empty lanes hold boxes that nothing hits."""
+    plane_distances, load_row = lanes.plane_distances, lanes.load_row
+
+    @wp.func
+    def distances(units: wp.uint64, node: int, lane: int, axis: int, row: int, rdir: float, bias: float):
+        """From the origin to a row of planes, along the ray."""
+        return plane_distances(units, node + 8 * row, lane, rdir, bias)
+
+    @wp.func
+    def ranks(units: wp.uint64, node: int, lane: int):
+        """Each child's place in the order of every octant."""
+        return load_row(units, node + wp.static(RANK_ROW), lane)
+
+    return SimpleNamespace(
+        distances=distances, ranks=ranks, rank_bits=4, child_row=CHILD_ROW, has_child=_always
+    )
+
+
+def compressed_node(lanes: SimpleNamespace) -> SimpleNamespace:
+    """Rows of bytes on the grid of an origin and three steps; empty lanes have no child."""
+    vector, words = lanes.vector, lanes.words
+    eight: bool = lanes.length == 8
+
+    @wp.func_native(BYTE_DISTANCES_8 if eight else BYTE_DISTANCES_1)
+    def distances(
+        units: wp.uint64, node: int, lane: int, axis: int, row: int, rdir: float, bias: float
+    ) -> vector: ...
+
+    @wp.func_native(RANKS_8 if eight else RANKS_1)
+    def ranks(units: wp.uint64, node: int, lane: int) -> words: ...
+
+    return SimpleNamespace(
+        distances=distances, ranks=ranks, rank_bits=3, child_row=COMPRESSED_CHILD_ROW, has_child=_has_child
+    )
+
+
+NODES = {"float32": float32_node, "compressed": compressed_node}

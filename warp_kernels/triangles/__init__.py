@@ -1,0 +1,1 @@
+"""The triangle tests of each accuracy."""

@@ -1,0 +1,48 @@
+"""The edge functions of the watertight test, in all lanes at once and in either precision."""
+
+from types import SimpleNamespace
+
+# mypy: ignore-errors
+# Warp compiles these functions: to mypy they are no Python.
+import warp as wp
+
+from wive.warp_kernels.lanes.lanes import without_gradient
+
+
+def edges_in_lanes(
+    lanes: SimpleNamespace,
+    form: SimpleNamespace,
+    axis_of: wp.Function,
+    kept_origin: wp.Function,
+    kept_shear: wp.Function,
+) -> wp.Function:
+    """Edge functions opposite to each corner of a block's triangles, from what the stack keeps of a ray."""
+    vector, products, load = lanes.triangles, lanes.products, form.load
+    stack_argument = lanes.stack_argument
+
+    @without_gradient
+    @wp.func
+    def edges(units: wp.uint64, block: int, lane: int, stack: stack_argument):
+        x = axis_of(stack, 0)
+        y = axis_of(stack, 1)
+        z = axis_of(stack, 2)
+        ox = vector(kept_origin(stack, 0))
+        oy = vector(kept_origin(stack, 1))
+        oz = vector(kept_origin(stack, 2))
+        sx = vector(kept_shear(stack, 0))
+        sy = vector(kept_shear(stack, 1))
+        za = load(units, block, lane, 0, z) - oz
+        zb = load(units, block, lane, 1, z) - oz
+        zc = load(units, block, lane, 2, z) - oz
+        xa = (load(units, block, lane, 0, x) - ox) - products(sx, za)
+        xb = (load(units, block, lane, 1, x) - ox) - products(sx, zb)
+        xc = (load(units, block, lane, 2, x) - ox) - products(sx, zc)
+        ya = (load(units, block, lane, 0, y) - oy) - products(sy, za)
+        yb = (load(units, block, lane, 1, y) - oy) - products(sy, zb)
+        yc = (load(units, block, lane, 2, y) - oy) - products(sy, zc)
+        u = products(xc, yb) - products(yc, xb)
+        v = products(xa, yc) - products(ya, xc)
+        w = products(xb, ya) - products(yb, xa)
+        return u, v, w
+
+    return edges

@@ -1,0 +1,123 @@
+"""Moeller and Trumbore 1997 on the triangles of a block, operation by operation as triangle_fast.h."""
+
+from types import SimpleNamespace
+
+# mypy: ignore-errors
+# Warp compiles these functions: to mypy they are no Python.
+import warp as wp
+
+from wive.warp_kernels.lanes.lanes import without_gradient
+from wive.warp_kernels.lanes.precision import PRECISIONS, kept_numbers
+from wive.warp_kernels.queries.frame import FRAMES, flip_sign
+
+# What the test keeps of a ray behind the stack's entries, in float32: origin and direction.
+KEPT_WORDS = 6
+
+
+def fast_triangles(
+    lanes: SimpleNamespace, form: SimpleNamespace, kept: int, precision: str = "float32"
+) -> SimpleNamespace:
+    """The test for these lanes, blocks and numbers, its ray kept from word `kept` of the stack."""
+    length: int = lanes.triangles_length
+    vector, products = lanes.triangles, lanes.products
+    load, edge, edge_at, used = form.load, form.edge, form.edge_at, form.used
+    stride_of, vertex_at = form.stride, form.vertex_at
+    stack_argument, frame_type = lanes.stack_argument, FRAMES[precision]
+    numbers, ray_numbers = PRECISIONS[precision], kept_numbers(lanes, precision, kept)
+    real, vec3, product, load_number = numbers.real, numbers.vec3, numbers.product, numbers.load
+    store, kept_vector = ray_numbers.store, ray_numbers.load_vector
+
+    @wp.func
+    def cross(a: vec3, b: vec3):
+        return vec3(
+            product(a[1], b[2]) - product(a[2], b[1]),
+            product(a[2], b[0]) - product(a[0], b[2]),
+            product(a[0], b[1]) - product(a[1], b[0]),
+        )
+
+    @wp.func
+    def dot(a: vec3, b: vec3):
+        return product(a[0], b[0]) + product(a[1], b[1]) + product(a[2], b[2])
+
+    @without_gradient
+    @wp.func
+    def prepare(ray: frame_type, stack: stack_argument):
+        """Keep what the test needs of a ray."""
+        for axis in range(3):
+            store(stack, axis, ray.origin[axis])
+            store(stack, 3 + axis, ray.direction[axis])
+
+    @without_gradient
+    @wp.func
+    def edge_vector(units: wp.uint64, at: int, stride: int, v0: vec3):
+        """From v0 to the vertex at this word."""
+        return vec3(
+            edge_at(units, at, v0[0]),
+            edge_at(units, at + stride, v0[1]),
+            edge_at(units, at + 2 * stride, v0[2]),
+        )
+
+    @without_gradient
+    @wp.func
+    def solve(units: wp.uint64, block: int, j: int, stack: stack_argument, negative: bool):
+        """t, u and v of the block's triangle j, which the ray meets."""
+        stride = stride_of(units, block)
+        at = vertex_at(units, block, 0, j)
+        v0 = vec3(
+            load_number(units, at), load_number(units, at + stride), load_number(units, at + 2 * stride)
+        )
+        e1 = edge_vector(units, vertex_at(units, block, 1, j), stride, v0)
+        e2 = edge_vector(units, vertex_at(units, block, 2, j), stride, v0)
+        d = kept_vector(stack, 3)
+        p = cross(d, e2)
+        s = kept_vector(stack, 0) - v0
+        q = cross(s, e1)
+        det = dot(e1, p)
+        size = wp.abs(det)
+        t = flip_sign(dot(e2, vec3(q[0] / size, q[1] / size, q[2] / size)), det)
+        return vec3(t, flip_sign(dot(s, p), det) / size, flip_sign(dot(d, q), det) / size)
+
+    @without_gradient
+    @wp.func
+    def candidates(units: wp.uint64, block: int, lane: int, stack: stack_argument):
+        """The lanes whose triangle the ray's line meets, one bit each; the second word is not used."""
+        o = kept_vector(stack, 0)
+        d = kept_vector(stack, 3)
+        d0 = vector(d[0])
+        d1 = vector(d[1])
+        d2 = vector(d[2])
+        sx = vector(o[0]) - load(units, block, lane, 0, 0)
+        sy = vector(o[1]) - load(units, block, lane, 0, 1)
+        sz = vector(o[2]) - load(units, block, lane, 0, 2)
+        e1x = edge(units, block, lane, 1, 0)
+        e1y = edge(units, block, lane, 1, 1)
+        e1z = edge(units, block, lane, 1, 2)
+        e2x = edge(units, block, lane, 2, 0)
+        e2y = edge(units, block, lane, 2, 1)
+        e2z = edge(units, block, lane, 2, 2)
+        px = products(d1, e2z) - products(d2, e2y)
+        py = products(d2, e2x) - products(d0, e2z)
+        pz = products(d0, e2y) - products(d1, e2x)
+        qx = products(sy, e1z) - products(sz, e1y)
+        qy = products(sz, e1x) - products(sx, e1z)
+        qz = products(sx, e1y) - products(sy, e1x)
+        det = products(e1x, px) + products(e1y, py) + products(e1z, pz)
+        us = products(sx, px) + products(sy, py) + products(sz, pz)
+        vs = products(d0, qx) + products(d1, qy) + products(d2, qz)
+        lanes = wp.uint32(0)
+        for i in range(length):
+            size = wp.abs(det[i])
+            u = flip_sign(us[i], det[i])
+            v = flip_sign(vs[i], det[i])
+            # A determinant of zero (a ray in the triangle's plane) and NaN (an unused lane) must fail.
+            zero = real(0.0)
+            if u >= zero and v >= zero and u + v <= size and size > zero:
+                lanes = lanes | wp.uint32(1 << i)
+        return wp.vec2ui(used(units, block, lane, lanes), wp.uint32(0))
+
+    return SimpleNamespace(prepare=prepare, candidates=candidates, solve=solve)
+
+
+def double_triangles(lanes: SimpleNamespace, form: SimpleNamespace, kept: int) -> SimpleNamespace:
+    """The same of float64 trees."""
+    return fast_triangles(lanes, form, kept, "float64")

@@ -1,0 +1,1 @@
+"""What wive uses itself: not for import by others, and free to change."""

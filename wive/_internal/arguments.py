@@ -1,0 +1,222 @@
+"""Checks on what users pass. Every error is one line: the argument, what was expected, what came."""
+
+import operator
+from collections.abc import Iterable, Sequence
+from typing import Any, Literal, TypeGuard
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from wive._internal.precision import FLOAT32, FLOAT64, Floats, Real, float32_or_refused, real_of
+
+Float32 = NDArray[np.float32]
+Int32 = NDArray[np.int32]
+Lanes = Literal[1, 8]
+
+# More threads than this only cost memory; the core takes 32-bit counts.
+MOST_THREADS = 4096
+MOST_COUNT = 2**31 - 1
+
+
+def choice(name: str, value: object, allowed: Iterable[str]) -> None:
+    """Raise ValueError unless `value` is one of the allowed names."""
+    allowed = tuple(allowed)
+    if not isinstance(value, str) or value not in allowed:
+        raise ValueError(f"{name} must be one of {', '.join(allowed)} in this version of wive, got {value!r}")
+
+
+def integer(name: str, value: object, lowest: int, highest: int = MOST_COUNT) -> int:
+    """`value` as an int within [lowest, highest]."""
+    try:
+        number = operator.index(value)  # type: ignore[arg-type]
+    except TypeError:
+        raise TypeError(f"{name} must be an integer, got {_described(value)}") from None
+    if not lowest <= number <= highest:
+        raise ValueError(f"{name} must be from {lowest} to {highest}, got {number}")
+    return number
+
+
+def real(name: str, value: object) -> float:
+    """`value` as a finite float."""
+    try:
+        number = float(value)  # type: ignore[arg-type]
+    except (TypeError, ValueError):
+        raise TypeError(f"{name} must be a real number, got {_described(value)}") from None
+    if not np.isfinite(number):
+        raise ValueError(f"{name} must be finite, got {number}")
+    return number
+
+
+def vector(name: str, value: ArrayLike) -> NDArray[np.float64]:
+    """`value` as a finite float64 vector (3,)."""
+    array = _numeric(name, value, "three real numbers", "fiu")
+    if array.shape != (3,):
+        raise ValueError(f"{name} must be three real numbers, got an array of shape {array.shape}")
+    if not np.isfinite(array).all():
+        raise ValueError(f"{name} must be finite, got {array.tolist()}")
+    return array.astype(np.float64)
+
+
+def mesh(vertices: ArrayLike, faces: ArrayLike, accuracy: str = "watertight") -> tuple[Floats, Int32]:
+    """Vertices (v,3) float32 or float64 and faces (f,3) int32, C-contiguous; such arrays are not copied.
+
+    Accuracy "exact" takes float32 numbers only.
+    """
+    points = _positions(vertices)
+    corners = _numeric("faces", faces, "an (f, 3) array of integers", "iu", "round them to integer indices")
+    if corners.shape == (0,):
+        corners = corners.reshape(0, 3)
+    if corners.ndim != 2 or corners.shape[1] != 3:
+        raise ValueError(
+            f"faces must have shape (f, 3), one row of three vertex indices a triangle, got {corners.shape}"
+        )
+    if corners.size and (corners.min() < 0 or corners.max() >= len(points)):
+        face = int(np.argmax(((corners < 0) | (corners >= len(points))).any(axis=1)))
+        raise ValueError(
+            f"faces must index the {len(points)} vertices from 0, got {corners[face].tolist()} in face {face}"
+        )
+    real = real_of(vertices)
+    if accuracy == "exact" and real is FLOAT64:
+        points, real = float32_or_refused(points), FLOAT32
+    return real.array(points), np.require(corners, np.int32, ["C", "A"])
+
+
+def moved_vertices(vertices: ArrayLike, count: int, real: Real) -> Floats:
+    """New positions (count,3) in the scene's dtype, C-contiguous; an array that is so is not copied."""
+    points = _positions(vertices)
+    if len(points) != count:
+        raise ValueError(
+            f"vertices must have shape ({count}, 3), as the scene's own, got {points.shape}: "
+            "make a new Scene for another mesh"
+        )
+    return real.array(points)
+
+
+def read_only(array: NDArray[Any]) -> NDArray[Any]:
+    """The same array, which can't be written to through this view."""
+    view = array.view(np.ndarray)
+    view.flags.writeable = False
+    return view
+
+
+def rays(
+    origins: ArrayLike, directions: ArrayLike, tmin: ArrayLike, tmax: ArrayLike, real: Real = FLOAT32
+) -> tuple[Floats, Floats, Floats, Floats]:
+    """Origins and directions (n,3), tmin and tmax (1,) or (n,), all C-contiguous and of `real`'s dtype.
+
+    A vector of shape (3,) is that of every ray.
+    """
+    dtype = real.dtype
+    origin_rows = origins if _is_ready(origins, dtype) else _vectors("origins", origins, real)
+    direction_rows = directions if _is_ready(directions, dtype) else _vectors("directions", directions, real)
+    if origin_rows.ndim == direction_rows.ndim == 1:
+        origin_rows, direction_rows = origin_rows[None], direction_rows[None]
+    elif origin_rows.ndim == 1:
+        origin_rows = np.tile(origin_rows, (len(direction_rows), 1))
+    elif direction_rows.ndim == 1:
+        direction_rows = np.tile(direction_rows, (len(origin_rows), 1))
+    count = len(origin_rows)
+    if len(direction_rows) != count:
+        raise ValueError(
+            f"origins and directions must be equally many, got {count} and {len(direction_rows)}"
+        )
+    common = real.limits  # looked up here, as a call of one ray spends most of its time in calls
+    low = common[tmin] if type(tmin) is float and tmin in common else limits("tmin", tmin, count, real)
+    high = common[tmax] if type(tmax) is float and tmax in common else limits("tmax", tmax, count, real)
+    return origin_rows, direction_rows, low, high
+
+
+def directions(value: ArrayLike, count: int, real: Real = FLOAT32) -> Floats:
+    """The directions of `count` rays, (count,3) of `real`'s dtype, C-contiguous unless all share one."""
+    rows = value if _is_ready(value, real.dtype) else _vectors("directions", value, real)
+    if rows.ndim == 1:
+        return np.broadcast_to(rows, (count, 3))
+    if len(rows) != count:
+        raise ValueError(f"directions must have shape ({count}, 3), one a hit, or (3,), got {rows.shape}")
+    return rows
+
+
+def threads(value: int | None) -> int:
+    """The number of threads to use; 0 is one for each core that this process may run on."""
+    if value is None:
+        return 0
+    return min(integer("threads", value, 1), MOST_THREADS)
+
+
+def in_flight(value: int | None) -> int:
+    """Rays interleaved per thread; 0 lets the core choose."""
+    return 0 if value is None else integer("in_flight", value, 1)
+
+
+def work(asked_threads: int | None, asked_in_flight: int | None, stats: bool) -> tuple[int, int, bool]:
+    """How the core is to trace: threads, rays in flight, whether to count."""
+    if asked_threads is None and asked_in_flight is None:
+        return 0, 0, bool(stats)
+    return threads(asked_threads), in_flight(asked_in_flight), bool(stats)
+
+
+def lanes(value: object, on_warp: bool) -> Lanes | None:
+    """8 or 1 lanes of a node a thread; None is "auto"."""
+    if value not in ("auto", 8, 1) or isinstance(value, bool):
+        raise ValueError(f"lanes must be one of auto, 8, 1, got {value!r}")
+    if value == "auto":
+        return None
+    if not on_warp:
+        raise ValueError(f"lanes is only for backend 'warp', got {value!r} on a CPU backend: leave it out")
+    return 8 if value == 8 else 1
+
+
+def limits(name: str, value: ArrayLike, count: int, real: Real = FLOAT32) -> Floats:
+    """The limits of `count` rays, (1,) or (count,) of `real`'s dtype."""
+    array = _numeric(name, value, "a real number or one per ray", "fiu")
+    if array.shape not in ((), (count,)):
+        raise ValueError(
+            f"{name} must be one number or have shape ({count},), one a ray, got shape {array.shape}"
+        )
+    return real.array(array.reshape(-1))
+
+
+def _is_ready(value: ArrayLike, dtype: np.dtype[Any]) -> TypeGuard[Floats]:
+    """Whether it is an (n,3) array as the core takes it: checks are most of a small call."""
+    return (
+        type(value) is np.ndarray
+        and value.dtype is dtype
+        and value.ndim == 2
+        and value.shape[1] == 3
+        and (flags := value.flags).c_contiguous
+        and flags.aligned
+    )
+
+
+def _positions(vertices: ArrayLike) -> NDArray[Any]:
+    points = _numeric("vertices", vertices, "a (v, 3) array of real numbers", "fiu")
+    if points.shape == (0,):
+        points = points.reshape(0, 3)
+    if points.ndim != 2 or points.shape[1] != 3:
+        raise ValueError(f"vertices must have shape (v, 3), got {points.shape}")
+    return points
+
+
+def _vectors(name: str, value: ArrayLike, real: Real) -> Floats:
+    array = _numeric(name, value, "an (n, 3) array of real numbers", "fiu")
+    if array.shape == (0,):
+        array = array.reshape(0, 3)
+    if array.ndim not in (1, 2) or array.shape[-1] != 3:
+        raise ValueError(f"{name} must have shape (n, 3), or (3,) if all rays share it, got {array.shape}")
+    return real.array(array)
+
+
+def _numeric(
+    name: str, value: ArrayLike, expected: str, kinds: Sequence[str], mend: str = "convert it first"
+) -> NDArray[Any]:
+    try:
+        array = np.asarray(value)
+    except (TypeError, ValueError):
+        raise ValueError(f"{name} must be {expected}, got rows of unequal length") from None
+    if array.dtype.kind not in kinds and array.shape != (0,):
+        raise TypeError(f"{name} must be {expected}, got dtype {array.dtype}: {mend}")
+    return array
+
+
+def _described(value: object) -> str:
+    return f"{type(value).__name__} {value!r:.60}"

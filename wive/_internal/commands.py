@@ -1,0 +1,174 @@
+"""What each command of the command line does, given its parsed options."""
+
+import time
+from argparse import Namespace
+from dataclasses import fields
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wive._internal.arguments import rays as checked_rays
+from wive._internal.files import atomic_write, check_output
+from wive._internal.npzfile import check_input, read_npy_or_npz
+from wive._internal.precision import Floats, Real, real_named
+from wive._internal.progress import progress_bar
+from wive._internal.terrain import terrain_camera, terrain_mesh
+from wive.all_hits import AllHits
+from wive.backend import Backend, backends
+from wive.camera import Camera
+from wive.hits import Hits
+from wive.meshfile import load_mesh
+from wive.rendering import Settings, check_png_output, render_counted, write_png
+from wive.scene import Scene
+
+# Rays per step of the progress bar.
+BATCH_RAYS = 500_000
+
+
+def render_picture(options: Namespace) -> None:
+    """`wive render`: path-trace a mesh, or the terrain, into a PNG."""
+    output = check_png_output(options.output)
+    options.albedo = options.albedo or ("gray" if options.mesh else "normals")
+    settings = Settings(**{field.name: getattr(options, field.name) for field in fields(Settings)})
+    scene = _scene(options, *(load_mesh(options.mesh) if options.mesh else terrain_mesh()))
+    camera = _camera(options, scene)
+    begin = time.perf_counter()
+    image, rays = render_counted(scene, camera, settings, progress=True)
+    seconds = time.perf_counter() - begin
+    write_png(output, image)
+    print(f"{output}: {_rate(rays, seconds)}, {_tracer(scene)}, {len(scene):,} triangles")
+
+
+def trace_rays(options: Namespace) -> None:
+    """`wive trace`: closest hits, or all, of a file of rays into an npz file."""
+    output = check_output(options.output, ".npz")
+    check_input(options.rays)
+    scene = _scene(options, *load_mesh(options.mesh, options.precision))
+    origins, directions, tmin, tmax = _read_rays(options.rays, real_named(options.precision))
+    count = len(origins)
+    query = scene.intersect_all if options.all else scene.intersect
+    found: list[Hits | AllHits] = []
+    begin = time.perf_counter()
+    with progress_bar(count, "ray", "tracing") as advance:
+        for first in range(0, max(count, 1), BATCH_RAYS):
+            batch = slice(first, first + BATCH_RAYS)
+            hits = query(
+                origins[batch],
+                directions[batch],
+                tmin[batch] if len(tmin) == count else tmin[0],
+                tmax[batch] if len(tmax) == count else tmax[0],
+                threads=options.threads,
+            )
+            found.append(hits)
+            advance(len(hits))
+    seconds = time.perf_counter() - begin
+    arrays: dict[str, Any] = {
+        name: np.concatenate([getattr(hits, name) for hits in found]) for name in ("t", "prim", "uv")
+    }
+    if options.all:
+        counts = [np.diff(hits.offsets) for hits in found if isinstance(hits, AllHits)]
+        arrays["offsets"] = np.concatenate([[0], np.cumsum(np.concatenate(counts))])
+    with atomic_write(output) as file:
+        np.savez(file, **arrays)
+    number = np.count_nonzero(arrays["prim"] >= 0)
+    print(f"{output}: {_rate(count, seconds)}, {number:,} hits, {_tracer(scene)}")
+
+
+def describe_mesh(options: Namespace) -> None:
+    """`wive info`: the mesh and the tree over it."""
+    vertices, faces = load_mesh(options.mesh, options.precision)
+    begin = time.perf_counter()
+    scene = _scene(options, vertices, faces)
+    seconds = time.perf_counter() - begin
+    digits = "g" if scene.precision == "float32" else ".12g"
+    low, high = (" ".join(f"{value:{digits}}" for value in corner) for corner in scene.bounds)
+    tree = scene._bvh
+    node_cost, triangle_cost = tree.sah
+    for name, value in (
+        ("triangles", f"{len(scene):,}"),
+        ("vertices", f"{len(scene.vertices):,}"),
+        ("bounds", f"{low} to {high}"),
+        ("backend", _tracer(scene)),
+        ("accuracy", scene.accuracy),
+        ("precision", scene.precision),
+        ("nodes", f"{len(tree.nodes):,}"),
+        ("form", f"{scene.nodes} nodes"),
+        ("depth", f"{tree.depth}"),
+        (
+            "SAH cost",
+            f"{node_cost + triangle_cost:.2f} ({node_cost:.2f} nodes, {triangle_cost:.2f} triangles)",
+        ),
+        ("memory", f"{scene.memory:,} bytes ({scene.memory / len(scene):.1f} a triangle)"),
+        ("build", f"{seconds:.3f} s"),
+    ):
+        print(f"{name:<10} {value}")
+
+
+def list_backends(options: Namespace) -> None:
+    """`wive backends`: what this machine can run, and on which devices."""
+    for name, backend in backends().items():
+        print(f"{name:<7} {_usable(backend)}")
+        for device, found in backend.devices.items():
+            print(f"  {device:<7} {_usable(found)}")
+
+
+def _scene(options: Namespace, vertices: NDArray[Any], faces: NDArray[Any]) -> Scene:
+    return Scene(
+        vertices,
+        faces,
+        backend=options.backend,
+        device=options.device,
+        accuracy=options.accuracy,
+        nodes=options.nodes,
+    )
+
+
+def _usable(backend: Backend) -> str:
+    if not backend.usable:
+        return f"not usable: {backend.reason}"
+    return f"usable, {backend.form} form" if backend.form else "usable"
+
+
+def _tracer(scene: Scene) -> str:
+    return scene.backend if scene.device is None else f"{scene.backend} on {scene.device}"
+
+
+def _camera(options: Namespace, scene: Scene) -> Camera:
+    """The camera that the options describe; what they leave open comes from the automatic one."""
+    fov = {} if options.fov is None else {"fov": options.fov}
+    if options.mesh is None:
+        camera = terrain_camera()
+    else:
+        camera = Camera.framing(scene.bounds, options.up, aspect=options.width / options.height, **fov)
+    return Camera(
+        eye=options.eye or camera.eye,
+        target=options.target or camera.target,
+        up=options.up or camera.up,
+        fov=options.fov or camera.fov,
+    )
+
+
+def _read_rays(name: str, real: Real) -> tuple[Floats, ...]:
+    """Origins, directions, tmin and tmax as `Scene.intersect` uses them."""
+    expected = "a file of rays, (n,6) or (n,8) in an .npy or `origins` and `directions` in an .npz"
+    loaded = read_npy_or_npz(name, expected)
+    if isinstance(loaded, dict):
+        if not {"origins", "directions"} <= loaded.keys():
+            raise ValueError(f"{name}: not {expected}: found arrays {', '.join(sorted(loaded)) or 'none'}")
+        limits = [loaded.get("tmin", 0.0), loaded.get("tmax", np.inf)]
+        columns = [loaded["origins"], loaded["directions"], *limits]
+    elif loaded.ndim != 2 or loaded.shape[1] not in (6, 8):
+        raise ValueError(f"{name}: not {expected}: found shape {loaded.shape}")
+    else:
+        limits = [loaded[:, 6], loaded[:, 7]] if loaded.shape[1] == 8 else [0.0, np.inf]
+        columns = [loaded[:, :3], loaded[:, 3:6], *limits]
+    try:
+        origins, directions, tmin, tmax = columns
+        return checked_rays(origins, directions, tmin, tmax, real)
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"{name}: {error}") from error
+
+
+def _rate(rays: int, seconds: float) -> str:
+    return f"{rays:,} rays in {seconds:.2f} s, {rays / max(seconds, 1e-9) / 1e6:.2f} Mray/s"
