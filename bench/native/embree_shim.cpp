@@ -64,25 +64,25 @@ constexpr int buffer_type_index = 0, buffer_type_vertex = 1;
 constexpr int format_uint3 = 0x5003, format_float3 = 0x9003;
 
 // Every entry point by its name in the library; resolve() fills them in.
-#define EMBREE_FUNCTIONS(X)                                                                                       \
-    X(rtcNewDevice, Handle, (const char*))                                                                        \
-    X(rtcReleaseDevice, void, (Handle))                                                                           \
-    X(rtcGetDeviceError, int, (Handle))                                                                           \
-    X(rtcGetDeviceProperty, std::ptrdiff_t, (Handle, int))                                                        \
-    X(rtcSetDeviceMemoryMonitorFunction, void, (Handle, bool (*)(void*, std::ptrdiff_t, bool), void*))            \
-    X(rtcNewScene, Handle, (Handle))                                                                              \
-    X(rtcReleaseScene, void, (Handle))                                                                            \
-    X(rtcSetSceneFlags, void, (Handle, int))                                                                      \
-    X(rtcSetSceneBuildQuality, void, (Handle, int))                                                               \
-    X(rtcCommitScene, void, (Handle))                                                                             \
-    X(rtcNewGeometry, Handle, (Handle, int))                                                                      \
-    X(rtcReleaseGeometry, void, (Handle))                                                                         \
-    X(rtcSetSharedGeometryBuffer, void,                                                                           \
-      (Handle, int, unsigned, int, const void*, std::size_t, std::size_t, std::size_t))                           \
-    X(rtcSetGeometryBuildQuality, void, (Handle, int))                                                            \
-    X(rtcCommitGeometry, void, (Handle))                                                                          \
-    X(rtcAttachGeometry, unsigned, (Handle, Handle))                                                              \
-    X(rtcIntersect1, void, (Handle, RayHit*, QueryArguments*))                                                    \
+#define EMBREE_FUNCTIONS(X)                                                                            \
+    X(rtcNewDevice, Handle, (const char*))                                                             \
+    X(rtcReleaseDevice, void, (Handle))                                                                \
+    X(rtcGetDeviceError, int, (Handle))                                                                \
+    X(rtcGetDeviceProperty, std::ptrdiff_t, (Handle, int))                                             \
+    X(rtcSetDeviceMemoryMonitorFunction, void, (Handle, bool (*)(void*, std::ptrdiff_t, bool), void*)) \
+    X(rtcNewScene, Handle, (Handle))                                                                   \
+    X(rtcReleaseScene, void, (Handle))                                                                 \
+    X(rtcSetSceneFlags, void, (Handle, int))                                                           \
+    X(rtcSetSceneBuildQuality, void, (Handle, int))                                                    \
+    X(rtcCommitScene, void, (Handle))                                                                  \
+    X(rtcNewGeometry, Handle, (Handle, int))                                                           \
+    X(rtcReleaseGeometry, void, (Handle))                                                              \
+    X(rtcSetSharedGeometryBuffer, void,                                                                \
+      (Handle, int, unsigned, int, const void*, std::size_t, std::size_t, std::size_t))                \
+    X(rtcSetGeometryBuildQuality, void, (Handle, int))                                                 \
+    X(rtcCommitGeometry, void, (Handle))                                                               \
+    X(rtcAttachGeometry, unsigned, (Handle, Handle))                                                   \
+    X(rtcIntersect1, void, (Handle, RayHit*, QueryArguments*))                                         \
     X(rtcOccluded1, void, (Handle, Ray*, QueryArguments*))
 
 #define DECLARE(name, result, arguments) result(*name) arguments = nullptr;
@@ -138,8 +138,8 @@ const char* shim_open(const char* path) {
     static std::string problem;
     void* library = dlopen(path, RTLD_NOW | RTLD_LOCAL);
     if (!library) return (problem = dlerror()).c_str();
-#define RESOLVE(name, result, arguments)                                      \
-    name = reinterpret_cast<result(*) arguments>(dlsym(library, #name));      \
+#define RESOLVE(name, result, arguments)                                 \
+    name = reinterpret_cast<result(*) arguments>(dlsym(library, #name)); \
     if (!name) return (problem = std::string(path) + " lacks " #name).c_str();
     EMBREE_FUNCTIONS(RESOLVE)
 #undef RESOLVE

@@ -55,8 +55,7 @@ void stand_for_any_hit(const BinaryTree& tree, const Coverage& coverage, Treelet
     }
     alignas(16) std::array<std::uint32_t, node_width> place{};
     for (std::size_t k = 0; k < node_width; ++k)
-        for (std::size_t i = 0; i < node_width; ++i)
-            place[i] += k < i ? worth[k] <= worth[i] : worth[k] < worth[i];
+        for (std::size_t i = 0; i < node_width; ++i) place[i] += k < i ? worth[k] <= worth[i] : worth[k] < worth[i];
     const std::array<Slot, node_width> slots = treelet.slots;
     std::uint32_t places = 0;  // four bits each
     for (std::size_t i = 0; i < count; ++i) {

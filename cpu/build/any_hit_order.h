@@ -32,9 +32,9 @@ private:
     std::vector<double> chunks_before_;
 };
 
-// Moves the slots of a treelet to where they shall stand, and its order with them. A slot's worth is how much of its box its
-// triangles cover, which is how likely a ray through the box hits one, over the square root of their number, which
-// stands for the time to find out (after Ize and Hansen 2011, "RTSAH Traversal Order for Occlusion Rays").
+// Moves the slots of a treelet to where they shall stand, and its order with them. A slot's worth is how much of its
+// box its triangles cover, which is how likely a ray through the box hits one, over the square root of their number,
+// which stands for the time to find out (after Ize and Hansen 2011, "RTSAH Traversal Order for Occlusion Rays").
 void stand_for_any_hit(const BinaryTree& tree, const Coverage& coverage, Treelet& treelet);
 
 }  // namespace wive

@@ -70,8 +70,8 @@ public:
             Item& item = items_[i];
             if (item.left == 0) continue;
             const Item &left = items_[item.left], &right = items_[item.left + 1];
-            item.costs = store_node(tree_, item.range.tree, item.range.box, right.range.tree.begin, item.axis, left.costs,
-                                    right.costs);
+            item.costs = store_node(tree_, item.range.tree, item.range.box, right.range.tree.begin, item.axis,
+                                    left.costs, right.costs);
         }
     }
 
@@ -103,7 +103,8 @@ private:
     // Brings a range's references to tree.refs.
     PrimRef* fetch(const Range& range, bool from_scratch) const {
         const Subtree& r = range.tree;
-        if (from_scratch) std::copy(tree_.nodes.data() + r.begin, tree_.nodes.data() + r.end, tree_.refs.data() + r.begin);
+        if (from_scratch)
+            std::copy(tree_.nodes.data() + r.begin, tree_.nodes.data() + r.end, tree_.refs.data() + r.begin);
         return tree_.refs.data();
     }
 

@@ -4,10 +4,10 @@
 #include <bit>
 #include <cstdint>
 
+#include "build/mesh.h"
 #include "core/box.h"
 #include "core/large_array.h"
 #include "core/layout.h"
-#include "build/mesh.h"
 #include "core/parallel.h"
 
 namespace wive {

@@ -3,7 +3,6 @@
 #include <cstring>
 #include <limits>
 
-
 namespace wive {
 namespace {
 

@@ -5,8 +5,8 @@
 #include <cstdint>
 
 #include "build/binary_tree.h"
-#include "core/box.h"
 #include "build/mesh.h"
+#include "core/box.h"
 
 namespace wive {
 

@@ -7,9 +7,9 @@
 
 #include "build/binary_tree.h"
 #include "build/emit.h"
-#include "core/parallel.h"
 #include "build/reinsertion.h"
 #include "build/write_node.h"
+#include "core/parallel.h"
 
 namespace wive {
 
@@ -30,7 +30,8 @@ Bvh::Bvh(const Mesh<Real>& mesh, const BuildOptions& options)
     Threads threads(thread_count(options.threads));
     if (mesh.face_count >= leaf_bit) throw std::invalid_argument("faces: too many triangles for one scene");
     if (doubles && accuracy_ == Accuracy::exact)
-        throw std::invalid_argument("accuracy: 'exact' takes vertices in float32, got float64; round them, or use 'watertight'");
+        throw std::invalid_argument(
+            "accuracy: 'exact' takes vertices in float32, got float64; round them, or use 'watertight'");
     check_mesh(mesh, threads);
     if constexpr (doubles) set_bounds(find_bounds(mesh, threads));
     const auto plant = [&] {
@@ -54,8 +55,8 @@ Bvh::Bvh(const Mesh<Real>& mesh, const BuildOptions& options)
 template Bvh::Bvh(const Mesh<float>&, const BuildOptions&);
 template Bvh::Bvh(const Mesh<double>&, const BuildOptions&);
 
-// Far from the origin, planes relative to the middle keep the boxes' slack small. Near it, they are left as they are, and so
-// stay exact.
+// Far from the origin, planes relative to the middle keep the boxes' slack small. Near it, they are left as they are,
+// and so stay exact.
 void Bvh::set_bounds(const Bounds& bounds) {
     bounds_ = bounds;
     const auto& [low, high] = bounds_;
@@ -67,8 +68,8 @@ void Bvh::set_bounds(const Bounds& bounds) {
     }
 }
 
-// What follows from the box of all triangles. Float32 trees learn their bounds from it; float64 trees had to know them before,
-// and their boxes are relative to the centre already. Returns what boxes are still to be taken relative to.
+// What follows from the box of all triangles. Float32 trees learn their bounds from it; float64 trees had to know them
+// before, and their boxes are relative to the centre already. Returns what boxes are still to be taken relative to.
 Point Bvh::settle(const Box& all) {
     Point still_to_center{};
     if (precision_ == Precision::float32) {

@@ -6,12 +6,12 @@
 #include <memory>
 #include <span>
 
+#include "build/mesh.h"
+#include "build/order.h"
 #include "core/box.h"
 #include "core/compressed.h"
 #include "core/large_array.h"
 #include "core/layout.h"
-#include "build/mesh.h"
-#include "build/order.h"
 
 namespace wive {
 

@@ -57,8 +57,8 @@ void share_slots(const SlotCosts& left, SlotCosts right, Slots<Float4v>& least, 
 }
 
 // The best way to gather a subtree of so many blocks, half its box's area; `costs` is set to what it costs.
-Choices gather(std::uint32_t blocks, std::uint32_t largest_leaf, float half_area, const SlotCosts& left, const SlotCosts& right, int axis,
-               SlotCosts& costs) {
+Choices gather(std::uint32_t blocks, std::uint32_t largest_leaf, float half_area, const SlotCosts& left,
+               const SlotCosts& right, int axis, SlotCosts& costs) {
     Slots<Float4v> shared;
     Slots<Int4v> shares;
     share_slots(left, right, shared, shares);
@@ -85,7 +85,8 @@ Choices gather(std::uint32_t blocks, std::uint32_t largest_leaf, float half_area
 SlotCosts store_node(BinaryTree& tree, const Subtree& top, const Box& box, std::uint32_t split, int axis,
                      const SlotCosts& left, const SlotCosts& right) {
     SlotCosts costs;
-    const Choices choices = gather(blocks_for(top.size()), tree.largest_leaf, box.half_area(), left, right, axis, costs);
+    const Choices choices =
+        gather(blocks_for(top.size()), tree.largest_leaf, box.half_area(), left, right, axis, costs);
     tree.nodes[top.place] = std::bit_cast<PrimRef>(
         BinaryNode{{box.lo[0], box.lo[1], box.lo[2]}, split, {box.hi[0], box.hi[1], box.hi[2]}, choices});
     return costs;

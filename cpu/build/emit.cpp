@@ -9,10 +9,10 @@
 
 #include "build/any_hit_order.h"
 #include "build/collapse.h"
-#include "core/parallel.h"
 #include "build/write_compressed.h"
 #include "build/write_float32.h"
 #include "build/write_node.h"
+#include "core/parallel.h"
 
 namespace wive {
 
@@ -41,7 +41,8 @@ class Emitter {
     using StoredNode = typename Writer::Node;
 
 public:
-    Emitter(const BinaryTree& tree, const Mesh<Real>& mesh, const BuildOptions& options, const std::array<float, 3>& center)
+    Emitter(const BinaryTree& tree, const Mesh<Real>& mesh, const BuildOptions& options,
+            const std::array<float, 3>& center)
         : tree_(tree), mesh_(mesh), options_(options), center_(center) {}
 
     using Size = TreeSize;
@@ -172,7 +173,9 @@ private:
     void write_node(StoredNode& out, const Treelet& treelet, const Children& children) const {
         Node node;
         for (int i = 0; i < node_width; ++i) {
-            write_box(node, i, i < treelet.count ? tree_.box_of(treelet.slots[static_cast<std::size_t>(i)].tree) : Box{}, center_);
+            write_box(node, i,
+                      i < treelet.count ? tree_.box_of(treelet.slots[static_cast<std::size_t>(i)].tree) : Box{},
+                      center_);
             node.child[i] = children[static_cast<std::size_t>(i)];
         }
         const SlotSequences order = options_.order == ChildOrder::treelet    ? treelet.order
@@ -186,8 +189,7 @@ private:
     std::uint32_t write_leaf(const Slot& slot, Size& cursor) const {
         const LeafPrims prims(tree_, slot.tree);
         const std::size_t first = cursor.leaf_units;
-        const LeafSize size =
-            Writer::write_leaf(mesh_, options_.accuracy, prims.span(), leaves_ + first * unit_bytes);
+        const LeafSize size = Writer::write_leaf(mesh_, options_.accuracy, prims.span(), leaves_ + first * unit_bytes);
         cursor.leaf_units += size.units;
         return leaf_child(first_leaf_unit_ + first, size.blocks);
     }
@@ -208,13 +210,16 @@ private:
 template <class Real>
 EmittedTree emit_tree(const BinaryTree& tree, const Mesh<Real>& mesh, const BuildOptions& options,
                       const std::array<float, 3>& center, Threads& threads) {
-    using Compressed = std::conditional_t<precision_of<Real> == Precision::float32, CompressedWriter, CompressedFloat64Writer>;
+    using Compressed =
+        std::conditional_t<precision_of<Real> == Precision::float32, CompressedWriter, CompressedFloat64Writer>;
     if (options.nodes == NodeForm::compressed)
         return Emitter<Compressed, Real>(tree, mesh, options, center).emit(threads);
     return Emitter<Float32Writer<Real>, Real>(tree, mesh, options, center).emit(threads);
 }
 
-template EmittedTree emit_tree(const BinaryTree&, const Mesh<float>&, const BuildOptions&, const std::array<float, 3>&, Threads&);
-template EmittedTree emit_tree(const BinaryTree&, const Mesh<double>&, const BuildOptions&, const std::array<float, 3>&, Threads&);
+template EmittedTree emit_tree(const BinaryTree&, const Mesh<float>&, const BuildOptions&, const std::array<float, 3>&,
+                               Threads&);
+template EmittedTree emit_tree(const BinaryTree&, const Mesh<double>&, const BuildOptions&, const std::array<float, 3>&,
+                               Threads&);
 
 }  // namespace wive

@@ -7,8 +7,8 @@
 
 #include "build/binary_tree.h"
 #include "build/builder.h"
-#include "core/large_array.h"
 #include "build/mesh.h"
+#include "core/large_array.h"
 #include "core/parallel.h"
 
 namespace wive {
@@ -26,8 +26,8 @@ struct LeafSize {
 };
 
 // Children of a node stand side by side, then subtree after subtree; the same on any number of threads. Throws
-// std::invalid_argument where the tree is larger than child references reach. center: what the tree's boxes are still to be
-// made relative to.
+// std::invalid_argument where the tree is larger than child references reach. center: what the tree's boxes are still
+// to be made relative to.
 template <class Real>
 EmittedTree emit_tree(const BinaryTree& tree, const Mesh<Real>& mesh, const BuildOptions& options,
                       const std::array<float, 3>& center, Threads& threads);

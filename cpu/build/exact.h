@@ -47,8 +47,8 @@ inline int orientation(const double a[2], const double b[2], const double c[2]) 
 }
 inline int orientation(const float a[2], const float b[2], const float c[2]) {
     const auto product = [](float x, float y) { return static_cast<double>(x) * static_cast<double>(y); };
-    return sign_of_sum(std::array<double, 6>{product(a[0], b[1]), -product(a[1], b[0]),    //
-                                             product(b[0], c[1]), -product(b[1], c[0]),    //
+    return sign_of_sum(std::array<double, 6>{product(a[0], b[1]), -product(a[1], b[0]),  //
+                                             product(b[0], c[1]), -product(b[1], c[0]),  //
                                              product(c[0], a[1]), -product(c[1], a[0])});
 }
 

@@ -60,7 +60,8 @@ float projected_area(Float4v a, Float4v b, Float4v c) {
 // are off by a unit roundoff u each, sums of two by another: 4u of both products' sizes, taken twice as large, and what
 // underflow may add.
 bool surely_has_area(Float4v a, Float4v b, Float4v c) {
-    constexpr float error = 4 * std::numeric_limits<float>::epsilon(), underflow = 4 * std::numeric_limits<float>::min();
+    constexpr float error = 4 * std::numeric_limits<float>::epsilon(),
+                    underflow = 4 * std::numeric_limits<float>::min();
     const Float4v u = b - a, v = c - a;
     const Float4v left = u * yzx(v), right = yzx(u) * v;
     const Float4v cross = left - right;
@@ -69,7 +70,8 @@ bool surely_has_area(Float4v a, Float4v b, Float4v c) {
 }
 
 bool surely_has_area(const double* a, const double* b, const double* c) {
-    constexpr double error = 4 * std::numeric_limits<double>::epsilon(), underflow = 4 * std::numeric_limits<double>::min();
+    constexpr double error = 4 * std::numeric_limits<double>::epsilon(),
+                     underflow = 4 * std::numeric_limits<double>::min();
     const double u[3] = {b[0] - a[0], b[1] - a[1], b[2] - a[2]}, v[3] = {c[0] - a[0], c[1] - a[1], c[2] - a[2]};
     bool sure = false;
     for (int k = 0; k < 3; ++k) {
@@ -109,9 +111,11 @@ void check_mesh(const Mesh<Real>& mesh, Threads& threads) {
     // those of infinities and NaNs above all others.
     const auto bad_vertices = [&](std::size_t begin, std::size_t end) {
         using Bits = std::conditional_t<sizeof(Real) == sizeof(float), std::int32_t, std::int64_t>;
-        constexpr Bits largest = std::bit_cast<Bits>(max_coordinate<Real>), magnitude = std::numeric_limits<Bits>::max();
+        constexpr Bits largest = std::bit_cast<Bits>(max_coordinate<Real>),
+                       magnitude = std::numeric_limits<Bits>::max();
         Bits bad = 0;
-        for (std::size_t i = 3 * begin; i < 3 * end; ++i) bad |= largest - (std::bit_cast<Bits>(mesh.vertices[i]) & magnitude);
+        for (std::size_t i = 3 * begin; i < 3 * end; ++i)
+            bad |= largest - (std::bit_cast<Bits>(mesh.vertices[i]) & magnitude);
         return bad < 0;
     };
     const auto bad_vertex = [&](std::size_t i) { return bad_vertices(i, i + 1); };

@@ -14,7 +14,7 @@ namespace wive {
 
 template <class Real>
 struct Mesh {
-    const Real* vertices;   // (vertex_count, 3)
+    const Real* vertices;  // (vertex_count, 3)
     std::size_t vertex_count;
     const std::int32_t* faces;  // (face_count, 3)
     std::size_t face_count;
@@ -24,8 +24,8 @@ struct Mesh {
     }
 };
 
-// A triangle's box, number and size, 32 bytes: the number rides in the low corner's fourth lane, the projected area in the
-// high one's.
+// A triangle's box, number and size, 32 bytes: the number rides in the low corner's fourth lane, the projected area in
+// the high one's.
 struct PrimRef {
     Float4v lo, hi;
 
@@ -48,8 +48,8 @@ void check_mesh(const Mesh<Real>& mesh, Threads& threads);
 using Point = std::array<float, 3>;
 
 // The box of a triangle, its projected area in the high corner's fourth lane; false where it has no area, decided
-// exactly. In float32, boxes are in the mesh's coordinates whatever the tree's centre, and nodes store them relative to it
-// later; in float64 they are relative to it from here on.
+// exactly. In float32, boxes are in the mesh's coordinates whatever the tree's centre, and nodes store them relative to
+// it later; in float64 they are relative to it from here on.
 bool box_triangle(const Mesh<float>& mesh, const Point& center, std::size_t face, Box& box);
 bool box_triangle(const Mesh<double>& mesh, const Point& center, std::size_t face, Box& box);
 

@@ -9,8 +9,8 @@
 namespace wive {
 
 // treelet: a depth-first walk of the binary treelet that swaps sides where the ray is negative on the split axis
-// (the paper's). diagonal: children sorted along the octant's diagonal. slots: children assigned to eight slots, visited by
-// slot number xor octant. none: shuffled, the same for every octant; what having no order costs.
+// (the paper's). diagonal: children sorted along the octant's diagonal. slots: children assigned to eight slots,
+// visited by slot number xor octant. none: shuffled, the same for every octant; what having no order costs.
 enum class ChildOrder { treelet, diagonal, slots, none };
 
 // For each octant, slots from front to back, four bits each, the first in the lowest bits.
@@ -26,8 +26,9 @@ constexpr SlotSequences single_slot(std::uint32_t slot) {
 inline SlotSequences join(const SlotSequences& left, int left_count, const SlotSequences& right, int right_count,
                           int axis) {
     static constexpr std::uint32_t no = 0, yes = ~0u;
-    alignas(16) static constexpr std::uint32_t is_negative[3][8] = {
-        {no, yes, no, yes, no, yes, no, yes}, {no, no, yes, yes, no, no, yes, yes}, {no, no, no, no, yes, yes, yes, yes}};
+    alignas(16) static constexpr std::uint32_t is_negative[3][8] = {{no, yes, no, yes, no, yes, no, yes},
+                                                                    {no, no, yes, yes, no, no, yes, yes},
+                                                                    {no, no, no, no, yes, yes, yes, yes}};
     SlotSequences joined;
     for (std::size_t octant = 0; octant < 8; ++octant) {
         const std::uint32_t forwards = left[octant] | right[octant] << 4 * left_count;

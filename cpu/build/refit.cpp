@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "build/builder.h"
+#include "build/write_node.h"
 #include "core/parallel.h"
 #include "traverse/slabs.h"
-#include "build/write_node.h"
 
 namespace wive {
 namespace {
@@ -36,7 +36,8 @@ public:
                 if (child != unused && is_inner(child)) nodes.push_back(child);
         std::vector<std::size_t> counts(nodes.size());
         parallel_for(nodes.size() - top, threads, [&](std::size_t i) { fit_subtree(nodes[top + i], counts[top + i]); });
-        for (std::size_t i = top; i-- > 0;) fit_node(nodes[i], counts[i], [&](std::uint32_t child) { return box_of(child); });
+        for (std::size_t i = top; i-- > 0;)
+            fit_node(nodes[i], counts[i], [&](std::uint32_t child) { return box_of(child); });
         for (const std::size_t count : counts) triangle_count_ += count;
     }
 
@@ -150,7 +151,8 @@ std::unique_ptr<Bvh> Bvh::refitted(const Mesh<Real>& mesh, unsigned asked_thread
     parallel_chunks(node_count_, chunk_size, threads, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) {
             const Node& old = old_nodes[i];
-            for (int lane = 0; lane < node_width; ++lane) write_box(to[i], lane, fitter.boxes(i)[lane], still_to_center);
+            for (int lane = 0; lane < node_width; ++lane)
+                write_box(to[i], lane, fitter.boxes(i)[lane], still_to_center);
             std::memcpy(to[i].child, old.child, sizeof old.child);
             std::memcpy(to[i].order, old.order, sizeof old.order);
         }

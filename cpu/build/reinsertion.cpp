@@ -15,8 +15,8 @@ namespace {
 
 constexpr std::uint32_t none = ~0u;
 constexpr std::size_t chunk_size = 1 << 10;  // searches differ much in length
-constexpr int deepest = 512;             // levels that recursion may go down
-constexpr int rounds = 3;                // each finds less than half of what the one before did
+constexpr int deepest = 512;                 // levels that recursion may go down
+constexpr int rounds = 3;                    // each finds less than half of what the one before did
 // What a move must save, in multiples of the moved subtree's own area. Small savings lower the cost on paper, but not
 // the steps of rays: they make siblings overlap.
 constexpr float least_gain = 1;
@@ -234,7 +234,8 @@ private:
             return block_costs(node.box);
         }
         auto [left, right] = node.child;
-        const Float4v a = linked_[left].box.lo + linked_[left].box.hi, b = linked_[right].box.lo + linked_[right].box.hi;
+        const Float4v a = linked_[left].box.lo + linked_[left].box.hi,
+                      b = linked_[right].box.lo + linked_[right].box.hi;
         const Float4v apart = b - a;
         int axis = 0;
         for (int k = 1; k < 3; ++k)

@@ -85,8 +85,8 @@ private:
     int count_ = 0;
 };
 
-// Hands out a leaf's triangles block by block: all that are left where they fit; else the first of them, and then, while
-// there is room, the one that adds the fewest vertices.
+// Hands out a leaf's triangles block by block: all that are left where they fit; else the first of them, and then,
+// while there is room, the one that adds the fewest vertices.
 class LeafPacker {
 public:
     LeafPacker(const Mesh<float>& mesh, std::span<const std::uint32_t> prims) : mesh_(mesh), count_(prims.size()) {
@@ -126,7 +126,8 @@ private:
     std::size_t count_;
 };
 
-void write_block(const Mesh<float>& mesh, std::span<const std::uint32_t> prims, SharedVertices vertices, std::byte* out) {
+void write_block(const Mesh<float>& mesh, std::span<const std::uint32_t> prims, SharedVertices vertices,
+                 std::byte* out) {
     const int stored = vertices.stored();
     std::uint32_t corners[2] = {0, static_cast<std::uint32_t>(stored) << 20};
     for (std::size_t lane = 0; lane < prims.size(); ++lane) {
@@ -180,7 +181,8 @@ LeafSize CompressedWriter::leaf_size(const Mesh<float>& mesh, std::span<const st
     return size;
 }
 
-LeafSize CompressedWriter::write_leaf(const Mesh<float>& mesh, Accuracy, std::span<const std::uint32_t> prims, std::byte* out) {
+LeafSize CompressedWriter::write_leaf(const Mesh<float>& mesh, Accuracy, std::span<const std::uint32_t> prims,
+                                      std::byte* out) {
     LeafSize size = {0, 0};
     for (LeafPacker packer(mesh, prims); !packer.done(); ++size.blocks) {
         SharedVertices vertices;

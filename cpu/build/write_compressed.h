@@ -5,11 +5,11 @@
 #include <cstdint>
 #include <span>
 
-#include "core/compressed.h"
 #include "build/emit.h"
-#include "core/layout.h"
 #include "build/mesh.h"
 #include "build/write_float32.h"
+#include "core/compressed.h"
+#include "core/layout.h"
 
 namespace wive {
 

@@ -8,8 +8,8 @@
 #include "build/binary_tree.h"
 #include "build/builder.h"
 #include "build/emit.h"
-#include "core/layout.h"
 #include "build/mesh.h"
+#include "core/layout.h"
 
 namespace wive {
 
@@ -19,9 +19,7 @@ struct Float32Writer {
     using Block = TriangleBlockOf<Real>;
 
     static void write_node(const wive::Node& node, int, Node& out) { out = node; }
-    static constexpr std::size_t leaf_units(std::uint32_t triangles) {
-        return blocks_for(triangles) * Block::units();
-    }
+    static constexpr std::size_t leaf_units(std::uint32_t triangles) { return blocks_for(triangles) * Block::units(); }
     static LeafSize write_leaf(const Mesh<Real>& mesh, Accuracy accuracy, std::span<const std::uint32_t> prims,
                                std::byte* out);
 };

@@ -7,9 +7,9 @@
 #include <cstring>
 #include <limits>
 
+#include "build/mesh.h"
 #include "core/box.h"
 #include "core/layout.h"
-#include "build/mesh.h"
 #include "core/planes.h"
 
 namespace wive {
@@ -29,7 +29,8 @@ inline void write_box(Node& node, int lane, const Box& box, const std::array<flo
 
 // Bytes behind a block's last row.
 template <class Real>
-inline constexpr std::size_t block_padding = sizeof(TriangleBlockOf<Real>) - sizeof TriangleBlockOf<Real>::rows - sizeof TriangleBlockOf<Real>::prim;
+inline constexpr std::size_t block_padding =
+    sizeof(TriangleBlockOf<Real>) - sizeof TriangleBlockOf<Real>::rows - sizeof TriangleBlockOf<Real>::prim;
 
 template <class Real>
 void clear_block(TriangleBlockOf<Real>& block) {

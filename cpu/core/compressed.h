@@ -27,10 +27,11 @@ struct alignas(64) CompressedNode {
 static_assert(sizeof(CompressedNode) == 128 && offsetof(CompressedNode, child) == 96);
 
 // Up to four triangles over six or eight vertices, each stored once: neighbours share them, and a leaf that does not
-// get by with eight takes two blocks. What follows the header: rows x, y, z of the vertices, then a prim a lane, in 96 or
-// 128 bytes. corners holds the number of each corner's vertex, four bits each, lane by lane: first vertices in the low half
-// of word 0, second in its high half, third in the low half of word 1. Above these, word 1 has a bit for each lane
-// that is used (the others hold prim -1), and then the number of vertices. One may read eight floats from any row on.
+// get by with eight takes two blocks. What follows the header: rows x, y, z of the vertices, then a prim a lane, in 96
+// or 128 bytes. corners holds the number of each corner's vertex, four bits each, lane by lane: first vertices in the
+// low half of word 0, second in its high half, third in the low half of word 1. Above these, word 1 has a bit for each
+// lane that is used (the others hold prim -1), and then the number of vertices. One may read eight floats from any row
+// on.
 struct alignas(32) CompressedBlock {
     static constexpr int few_vertices = 6, most_vertices = 8;
 

@@ -11,7 +11,8 @@ inline constexpr int node_width = 8;
 inline constexpr int block_width = 4;
 inline constexpr std::size_t unit_bytes = 32;  // what child references count in
 
-// What a scene's numbers are: vertices, rays, t, u and v. Boxes are float32 in either. In templates: Real, float or double.
+// What a scene's numbers are: vertices, rays, t, u and v. Boxes are float32 in either. In templates: Real, float or
+// double.
 enum class Precision { float32, float64 };
 template <class Real>
 inline constexpr Precision precision_of = std::is_same_v<Real, double> ? Precision::float64 : Precision::float32;
@@ -36,8 +37,11 @@ struct alignas(32) TriangleBlockOf {
     Real rows[9][block_width];
     std::int32_t prim[block_width];
 
-    // Always inlined, as all that kernels call: a copy compiled for one instruction set must not be linked into another.
-    [[gnu::always_inline]] Real vertex(int k, int axis, int lane) const { return rows[3 * k + axis][lane]; }  // but in `fast` trees
+    // Always inlined, as all that kernels call: a copy compiled for one instruction set must not be linked into
+    // another.
+    [[gnu::always_inline]] Real vertex(int k, int axis, int lane) const {
+        return rows[3 * k + axis][lane];
+    }  // but in `fast` trees
     [[gnu::always_inline]] std::int32_t prim_at(int lane) const { return prim[lane]; }
     [[gnu::always_inline]] const TriangleBlockOf* next() const { return this + 1; }
     [[gnu::always_inline]] static constexpr std::size_t units() { return sizeof(TriangleBlockOf) / unit_bytes; }
@@ -50,9 +54,9 @@ enum class NodeForm { float32, compressed };
 inline constexpr int node_form_count = 2;
 
 // Nodes and blocks stand in one piece of memory, first the nodes, then the blocks, counted in units of unit_bytes:
-// a node is eight units, a block five (compressed: four, and three or four; of doubles ten, whatever the nodes). A child reference holds the unit where the child begins, times eight; a
-// leaf sets leaf_bit and puts its number of blocks, less one, in the low three bits. So one mask and one shift lead
-// to a child of either kind.
+// a node is eight units, a block five (compressed: four, and three or four; of doubles ten, whatever the nodes). A
+// child reference holds the unit where the child begins, times eight; a leaf sets leaf_bit and puts its number of
+// blocks, less one, in the low three bits. So one mask and one shift lead to a child of either kind.
 inline constexpr std::size_t max_units = std::size_t{1} << 28;
 inline constexpr std::uint32_t leaf_bit = 0x80000000u;
 inline constexpr int max_leaf_blocks = 8;
@@ -79,12 +83,13 @@ enum class Accuracy { fast, watertight, exact };
 inline constexpr int accuracy_count = 3;
 
 struct BvhView {
-    const std::byte* units;  // begins with the root, always an inner node
+    const std::byte* units;       // begins with the root, always an inner node
     alignas(16) float center[4];  // planes are relative to this point; the fourth lane is zero
     alignas(16) float extent[4];  // the largest |plane| on each axis
 
     template <class Form>
-    [[gnu::always_inline]] const typename Form::Node& node(std::uint32_t child) const {  // an inner child has nothing to mask
+    [[gnu::always_inline]] const typename Form::Node& node(
+        std::uint32_t child) const {  // an inner child has nothing to mask
         return *reinterpret_cast<const typename Form::Node*>(units + std::size_t{child} * (unit_bytes / 8));
     }
     template <class Form>

@@ -28,8 +28,8 @@ inline unsigned thread_count(unsigned asked) {
     return std::max(1u, std::thread::hardware_concurrency());
 }
 
-// Gives other threads the core until ready() or a moment has passed. To wake a sleeping thread takes the system as long as
-// many a piece of work, on virtual cores longer; most waiting here is shorter than that.
+// Gives other threads the core until ready() or a moment has passed. To wake a sleeping thread takes the system as long
+// as many a piece of work, on virtual cores longer; most waiting here is shorter than that.
 template <class Ready>
 void wait_a_moment(const Ready& ready) {
     using Clock = std::chrono::steady_clock;
@@ -38,8 +38,8 @@ void wait_a_moment(const Ready& ready) {
 }
 
 // The calling thread and, once there is work for them, up to count - 1 helpers, which wait between one piece of work
-// and the next, soon asleep, and end with this object. A helper that the system has not woken yet is not waited for, so on
-// a busy machine the caller goes on alone.
+// and the next, soon asleep, and end with this object. A helper that the system has not woken yet is not waited for, so
+// on a busy machine the caller goes on alone.
 class Threads {
 public:
     explicit Threads(unsigned count) : count_(count) {}

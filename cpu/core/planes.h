@@ -19,7 +19,8 @@ inline float plane_below(double plane, float center) {
     const double b = -static_cast<double>(center), p = plane + b;
     const double rest = rounded_off_sum(plane, b, p);
     const float below = float_below(p);
-    return static_cast<double>(below) == p && rest < 0 ? std::nextafter(below, -std::numeric_limits<float>::infinity()) : below;
+    return static_cast<double>(below) == p && rest < 0 ? std::nextafter(below, -std::numeric_limits<float>::infinity())
+                                                       : below;
 }
 template <class Real>
 float plane_above(Real plane, float center) {

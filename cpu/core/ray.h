@@ -22,12 +22,12 @@ class HitList;
 // Where results go; a null pointer is an output nobody asked for.
 template <class Real>
 struct HitBatch {
-    Real* t = nullptr;             // (n,) infinity on a miss
-    std::int32_t* prim = nullptr;  // (n,) -1 on a miss
-    Real* uv = nullptr;            // (n, 2) NaN on a miss
-    bool* occluded = nullptr;      // (n,) any-hit queries write only this
-    std::int32_t* stats = nullptr; // (n, 3) inner nodes, leaves, triangles
-    std::int32_t* count = nullptr; // (n,) hits of each ray, where all are asked for
+    Real* t = nullptr;               // (n,) infinity on a miss
+    std::int32_t* prim = nullptr;    // (n,) -1 on a miss
+    Real* uv = nullptr;              // (n, 2) NaN on a miss
+    bool* occluded = nullptr;        // (n,) any-hit queries write only this
+    std::int32_t* stats = nullptr;   // (n, 3) inner nodes, leaves, triangles
+    std::int32_t* count = nullptr;   // (n,) hits of each ray, where all are asked for
     HitList<Real>* found = nullptr;  // and the hits themselves: a list for each worker of the batch
 };
 

@@ -36,7 +36,8 @@ std::string_view known_form() {
         std::memcpy(vendor, name, sizeof name);
         const unsigned base = signature >> 8 & 0xf, family = base == 0xf ? base + (signature >> 20 & 0xff) : base;
         for (const Measured& machine : measured)
-            if (machine.vendor == std::string_view(vendor, sizeof vendor) && machine.family == family) return machine.better;
+            if (machine.vendor == std::string_view(vendor, sizeof vendor) && machine.family == family)
+                return machine.better;
     }
     return race;
 }
@@ -48,8 +49,8 @@ std::string_view choose() {
     std::string_view form = known_form();
     if (const char* asked = std::getenv("WIVE_AVX512_FORM"); asked != nullptr && *asked != '\0') {
         if (asked != full && asked != half && asked != race)
-            throw std::invalid_argument("WIVE_AVX512_FORM must be 'full', 'half' or 'race', got '" + std::string(asked) +
-                                        "': unset it to leave the choice to wive");
+            throw std::invalid_argument("WIVE_AVX512_FORM must be 'full', 'half' or 'race', got '" +
+                                        std::string(asked) + "': unset it to leave the choice to wive");
         form = asked == full ? full : asked == half ? half : race;
     }
     if (form != race) return form;

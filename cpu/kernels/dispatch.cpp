@@ -32,7 +32,8 @@ bool has_avx512() { return false; }
 struct Entry {
     std::string_view name;
     const KernelTable<float>* (*kernels)();  // "avx512" is a choice of two, made by the first query that needs it
-    const KernelTable<double>* (*float64_kernels)();  // null where the name is for comparisons of float32 traversals only
+    const KernelTable<double>* (
+        *float64_kernels)();  // null where the name is for comparisons of float32 traversals only
     bool compiled, runs;
     std::string_view needs;
 };
@@ -73,11 +74,14 @@ const KernelTable<Real>& find_kernels(std::string_view name) {
         if (entry.name != name) continue;
         if (const std::string reason = why_not(entry); !reason.empty())
             throw std::invalid_argument("kernel '" + std::string(name) + "' can't run here: " + reason);
-        if constexpr (precision_of<Real> == Precision::float32) return *entry.kernels();
-        else if (entry.float64_kernels != nullptr) return *entry.float64_kernels();
+        if constexpr (precision_of<Real> == Precision::float32)
+            return *entry.kernels();
+        else if (entry.float64_kernels != nullptr)
+            return *entry.float64_kernels();
         else
-            throw std::invalid_argument("kernel '" + std::string(name) +
-                                        "' traces float32 scenes only: give vertices in float32, or use 'avx512', 'avx2' or 'scalar'");
+            throw std::invalid_argument(
+                "kernel '" + std::string(name) +
+                "' traces float32 scenes only: give vertices in float32, or use 'avx512', 'avx2' or 'scalar'");
     }
     throw std::invalid_argument("unknown kernel '" + std::string(name) + "'");
 }

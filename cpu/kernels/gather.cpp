@@ -18,13 +18,16 @@ struct Hit {
 };
 
 template <class Real>
-bool comes_before(const Hit<Real>& a, const Hit<Real>& b) { return a.t != b.t ? a.t < b.t : a.prim < b.prim; }
+bool comes_before(const Hit<Real>& a, const Hit<Real>& b) {
+    return a.t != b.t ? a.t < b.t : a.prim < b.prim;
+}
 
 // Sorts rows [begin, end), by way of `together`, in which a hit stands in one piece.
 template <class Real>
 void sort_rows(const SortedHits<Real>& hits, std::size_t begin, std::size_t end, std::vector<Hit<Real>>& together) {
     together.clear();
-    for (std::size_t i = begin; i < end; ++i) together.push_back({hits.t[i], hits.prim[i], hits.uv[2 * i], hits.uv[2 * i + 1]});
+    for (std::size_t i = begin; i < end; ++i)
+        together.push_back({hits.t[i], hits.prim[i], hits.uv[2 * i], hits.uv[2 * i + 1]});
     std::sort(together.begin(), together.end(), comes_before<Real>);
     for (std::size_t i = begin; i < end; ++i) {
         const Hit<Real>& hit = together[i - begin];
@@ -75,7 +78,8 @@ void Gathering<Real>::sort_into(const SortedHits<Real>& hits) {
     parallel_chunks(counts_.size(), rays_per_sort, threads, [&](std::size_t begin, std::size_t end) {
         std::vector<Hit<Real>> together;
         for (std::size_t i = begin; i < end; ++i) {
-            const auto first = static_cast<std::size_t>(hits.offsets[i]), last = static_cast<std::size_t>(hits.offsets[i + 1]);
+            const auto first = static_cast<std::size_t>(hits.offsets[i]),
+                       last = static_cast<std::size_t>(hits.offsets[i + 1]);
             if (last - first > 1) sort_rows(hits, first, last, together);
         }
     });

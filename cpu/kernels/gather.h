@@ -3,9 +3,9 @@
 
 #include <vector>
 
-#include "traverse/hit_list.h"
 #include "core/large_array.h"
 #include "kernels/trace.h"
+#include "traverse/hit_list.h"
 
 namespace wive {
 
@@ -35,8 +35,8 @@ public:
 
 private:
     unsigned threads_;
-    LargeArray<std::int32_t> counts_;  // of each ray; runs down as they are moved out
-    std::vector<HitList<Real>> lists_; // one a worker
+    LargeArray<std::int32_t> counts_;   // of each ray; runs down as they are moved out
+    std::vector<HitList<Real>> lists_;  // one a worker
 };
 
 }  // namespace wive

@@ -79,7 +79,8 @@ bool is_faster(const KernelTable<float>& challenger, const KernelTable<float>& h
     // how it is used, so that which is faster is asked of the product of their times.
     const std::array in_flight = {1u, 0u};
     double best[2][2];
-    for (auto& of_table : best) std::fill(std::begin(of_table), std::end(of_table), std::numeric_limits<double>::infinity());
+    for (auto& of_table : best)
+        std::fill(std::begin(of_table), std::end(of_table), std::numeric_limits<double>::infinity());
     for (int turn = 0; turn < turns; ++turn)
         for (std::size_t table = 0; table < 2; ++table) {
             const TraceBatch<float> kernel = tables[table]->find(choice);

@@ -6,8 +6,8 @@
 #include <type_traits>
 #include <utility>
 
-#include "traverse/in_flight.h"
 #include "kernels/kernels.h"
+#include "traverse/in_flight.h"
 #include "traverse/query_exact.h"
 #include "traverse/triangle_exact.h"
 #include "traverse/triangle_fast.h"
@@ -38,13 +38,15 @@ struct KernelMaker {
     using Real = typename Isa::Real;
 
     template <QueryKind kind>
-    using Query = std::tuple_element_t<static_cast<std::size_t>(kind), std::tuple<ClosestHit<Real>, AnyHit<Real>, AllHits<Real>, CountHits<Real>>>;
+    using Query = std::tuple_element_t<static_cast<std::size_t>(kind),
+                                       std::tuple<ClosestHit<Real>, AnyHit<Real>, AllHits<Real>, CountHits<Real>>>;
 
     template <template <class> class Slabs, template <class> class Triangles, class Query, bool counting>
     struct Kernel {
         static constexpr TraceBatch<Real> trace =
             trace_batch<Isa, Slabs, Triangles, Query, std::conditional_t<counting, StepCounters, NoCounters>>;
-        static constexpr std::size_t flight_bytes = sizeof(Flight<typename Triangles<Isa>::Frame, typename Query::InFlight, StepCounters>);
+        static constexpr std::size_t flight_bytes =
+            sizeof(Flight<typename Triangles<Isa>::Frame, typename Query::InFlight, StepCounters>);
     };
     struct NoKernel {
         static constexpr TraceBatch<Real> trace = nullptr;
@@ -54,7 +56,8 @@ struct KernelMaker {
     template <KernelChoice choice, template <class> class Slabs>
     static constexpr auto kernel_with() {
         using Asked = Query<choice.query>;
-        constexpr bool exact_of_doubles = choice.accuracy == Accuracy::exact && precision_of<Real> == Precision::float64;
+        constexpr bool exact_of_doubles =
+            choice.accuracy == Accuracy::exact && precision_of<Real> == Precision::float64;
         if constexpr (!made_for(choice) || exact_of_doubles || std::is_same_v<Slabs<Isa>, NoSlabs<Isa>>)
             return NoKernel{};
         else if constexpr (choice.accuracy == Accuracy::fast)

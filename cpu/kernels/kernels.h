@@ -44,7 +44,7 @@ using TraceBatch = void (*)(const BvhView&, const RayBatch<Real>&, const HitBatc
 template <class Real>
 struct KernelTable {
     std::string_view name;
-    std::size_t flight_bytes;  // of the largest kernel
+    std::size_t flight_bytes;                            // of the largest kernel
     std::array<TraceBatch<Real>, kernel_count> kernels;  // null: the table was not made for this
 
     // Throws std::invalid_argument, naming the choice, where the table was not made for it.

@@ -1,8 +1,8 @@
 #include "kernels/kernels.h"
 
 #if defined(__AVX2__)
-#include "traverse/compressed_slabs.h"
 #include "kernels/kernel_table.h"
+#include "traverse/compressed_slabs.h"
 #include "traverse/simd_avx2.h"
 #include "traverse/slabs.h"
 

@@ -1,5 +1,5 @@
-#include "traverse/compressed_slabs.h"
 #include "kernels/kernel_table.h"
+#include "traverse/compressed_slabs.h"
 #include "traverse/simd_scalar.h"
 #include "traverse/slabs.h"
 

@@ -2,9 +2,9 @@
 
 #include <algorithm>
 
-#include "traverse/hit_list.h"
 #include "core/large_array.h"
 #include "core/parallel.h"
+#include "traverse/hit_list.h"
 
 namespace wive {
 namespace {

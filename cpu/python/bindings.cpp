@@ -2,11 +2,11 @@
 #include <optional>
 #include <span>
 
-#include "kernels/avx512_form.h"
-#include "python/bindings.h"
-#include "kernels/dispatch.h"
-#include "exact_source.h"
 #include "core/parallel.h"
+#include "exact_source.h"
+#include "kernels/avx512_form.h"
+#include "kernels/dispatch.h"
+#include "python/bindings.h"
 #include "render/render.h"
 
 namespace wive {
@@ -53,25 +53,27 @@ template <class Real>
 std::unique_ptr<PyBvh> build(Array<Real> vertices, Array<std::int32_t> faces, const std::string& accuracy,
                              const std::string& order, unsigned threads, int depth_limit, const std::string& nodes,
                              const std::string& quality) {
-    const BuildOptions options = {parse_accuracy(accuracy), parse_nodes(nodes), parse_order(order),
-                                  threads,                  depth_limit,        parse_quality(quality)};
+    const BuildOptions options = {
+        parse_accuracy(accuracy), parse_nodes(nodes), parse_order(order), threads, depth_limit, parse_quality(quality)};
     return std::make_unique<PyBvh>(std::move(vertices), std::move(faces), options);
 }
 
 // Function and context as ctypes gives their addresses.
 ForeignTracer foreign_tracer(const std::optional<std::pair<std::uintptr_t, std::uintptr_t>>& addresses) {
     if (!addresses) return {};
-    return {reinterpret_cast<ForeignTracer::Function>(addresses->first), reinterpret_cast<const void*>(addresses->second)};
+    return {reinterpret_cast<ForeignTracer::Function>(addresses->first),
+            reinterpret_cast<const void*>(addresses->second)};
 }
 
 std::uint64_t render(const PyBvh& self, const std::string& kernel, const Array<float>& camera, Array<float> image,
-                     int row_begin, int row_end, int samples, int bounces, const std::string& albedo, std::uint32_t seed,
-                     unsigned threads, unsigned in_flight,
+                     int row_begin, int row_end, int samples, int bounces, const std::string& albedo,
+                     std::uint32_t seed, unsigned threads, unsigned in_flight,
                      std::optional<std::pair<std::uintptr_t, std::uintptr_t>> tracer) {
     expect(self.bvh().precision() == Precision::float32, "render: expected a float32 scene, got float64");
     expect(camera.ndim() == 2 && camera.shape(0) == 4 && camera.shape(1) == 3, "camera: expected shape (4, 3)");
     expect(image.ndim() == 3 && image.shape(2) == 3, "image: expected shape (height, width, 3)");
-    expect(0 <= row_begin && row_begin <= row_end && row_end <= image.shape(0), "rows: expected a range within the image");
+    expect(0 <= row_begin && row_begin <= row_end && row_end <= image.shape(0),
+           "rows: expected a range within the image");
     expect(samples > 0 && bounces >= 0, "samples, bounces: expected at least 1 and 0");
     expect(albedo == "gray" || albedo == "normals", "albedo: expected 'gray' or 'normals'");
     const auto row = [&](py::ssize_t i) { return load_vec3(camera.data(i, 0)); };
@@ -105,7 +107,8 @@ py::array_t<T> view(py::handle owner, std::vector<py::ssize_t> shape, const T* d
 }
 
 // Nodes or blocks as words, in rows of so many.
-py::array_t<std::uint32_t> rows(py::handle owner, std::span<const std::byte> data, std::size_t each, std::size_t columns) {
+py::array_t<std::uint32_t> rows(py::handle owner, std::span<const std::byte> data, std::size_t each,
+                                std::size_t columns) {
     return view(owner,
                 {static_cast<py::ssize_t>(data.size() / each), static_cast<py::ssize_t>(each / 4 / columns),
                  static_cast<py::ssize_t>(columns)},
@@ -139,56 +142,64 @@ PYBIND11_MODULE(_cpu, m, pybind11::mod_gil_not_used()) {
         bvh.def(py::init(&build<Real>), array_arg("vertices"), array_arg("faces"), py::arg("accuracy") = "watertight",
                 py::arg("order") = "treelet", py::arg("threads") = 0, py::arg("depth_limit") = max_depth,
                 py::arg("nodes") = "float32", py::arg("quality") = "medium");
-        bvh.def("refitted", [](const PyBvh& self, const Array<Real>& vertices, unsigned threads) {
-            return std::make_unique<PyBvh>(self, vertices, threads);
-        }, array_arg("vertices"), py::arg("threads") = 0);
+        bvh.def(
+            "refitted",
+            [](const PyBvh& self, const Array<Real>& vertices, unsigned threads) {
+                return std::make_unique<PyBvh>(self, vertices, threads);
+            },
+            array_arg("vertices"), py::arg("threads") = 0);
     });
     bvh.def_property_readonly("vertices", &PyBvh::vertices)
-        .def_property_readonly("precision", [](const PyBvh& self) {
-            return self.bvh().precision() == Precision::float32 ? "float32" : "float64";
-        })
-        .def_property_readonly("nodes", [](py::object self) {
-            const Bvh& bvh = self.cast<const PyBvh&>().bvh();
-            return rows(self, bvh.nodes(), bvh.node_bytes(), 8);
-        })
-        .def_property_readonly("blocks", [](py::object self) {
-            const Bvh& bvh = self.cast<const PyBvh&>().bvh();
-            if (bvh.precision() == Precision::float64) return rows(self, bvh.blocks(), sizeof(TriangleBlockOf<double>), 4);
-            if (bvh.node_form() == NodeForm::compressed) return rows(self, bvh.blocks(), unit_bytes, 8);
-            return rows(self, bvh.blocks(), sizeof(TriangleBlock), 4);
-        })
-        .def_property_readonly("units", [](py::object self) {
-            const Bvh& bvh = self.cast<const PyBvh&>().bvh();
-            return view(self, {static_cast<py::ssize_t>(bvh.bytes() / unit_bytes), 8},
-                        reinterpret_cast<const std::uint32_t*>(bvh.view().units));
-        })
-        .def_property_readonly("center", [](const PyBvh& self) {
-            const BvhView v = self.bvh().view();
-            return copy(std::array{v.center[0], v.center[1], v.center[2]});
-        })
-        .def_property_readonly("extent", [](const PyBvh& self) {
-            const BvhView v = self.bvh().view();
-            return copy(std::array{v.extent[0], v.extent[1], v.extent[2]});
-        })
-        .def_property_readonly("bounds", [](const PyBvh& self) -> py::array {
-            const py::array_t<double> bounds({2, 3}, self.bvh().bounds()[0].data());
-            if (self.bvh().precision() == Precision::float64) return bounds;
-            return py::array_t<float>(bounds);
-        })
-        .def_property_readonly("accuracy", [](const PyBvh& self) {
-            return accuracy_name(self.bvh().accuracy());
-        })
-        .def_property_readonly("node_form", [](const PyBvh& self) {
-            return self.bvh().node_form() == NodeForm::float32 ? "float32" : "compressed";
-        })
+        .def_property_readonly(
+            "precision",
+            [](const PyBvh& self) { return self.bvh().precision() == Precision::float32 ? "float32" : "float64"; })
+        .def_property_readonly("nodes",
+                               [](py::object self) {
+                                   const Bvh& bvh = self.cast<const PyBvh&>().bvh();
+                                   return rows(self, bvh.nodes(), bvh.node_bytes(), 8);
+                               })
+        .def_property_readonly("blocks",
+                               [](py::object self) {
+                                   const Bvh& bvh = self.cast<const PyBvh&>().bvh();
+                                   if (bvh.precision() == Precision::float64)
+                                       return rows(self, bvh.blocks(), sizeof(TriangleBlockOf<double>), 4);
+                                   if (bvh.node_form() == NodeForm::compressed)
+                                       return rows(self, bvh.blocks(), unit_bytes, 8);
+                                   return rows(self, bvh.blocks(), sizeof(TriangleBlock), 4);
+                               })
+        .def_property_readonly("units",
+                               [](py::object self) {
+                                   const Bvh& bvh = self.cast<const PyBvh&>().bvh();
+                                   return view(self, {static_cast<py::ssize_t>(bvh.bytes() / unit_bytes), 8},
+                                               reinterpret_cast<const std::uint32_t*>(bvh.view().units));
+                               })
+        .def_property_readonly("center",
+                               [](const PyBvh& self) {
+                                   const BvhView v = self.bvh().view();
+                                   return copy(std::array{v.center[0], v.center[1], v.center[2]});
+                               })
+        .def_property_readonly("extent",
+                               [](const PyBvh& self) {
+                                   const BvhView v = self.bvh().view();
+                                   return copy(std::array{v.extent[0], v.extent[1], v.extent[2]});
+                               })
+        .def_property_readonly("bounds",
+                               [](const PyBvh& self) -> py::array {
+                                   const py::array_t<double> bounds({2, 3}, self.bvh().bounds()[0].data());
+                                   if (self.bvh().precision() == Precision::float64) return bounds;
+                                   return py::array_t<float>(bounds);
+                               })
+        .def_property_readonly("accuracy", [](const PyBvh& self) { return accuracy_name(self.bvh().accuracy()); })
+        .def_property_readonly(
+            "node_form",
+            [](const PyBvh& self) { return self.bvh().node_form() == NodeForm::float32 ? "float32" : "compressed"; })
         .def_property_readonly("depth", [](const PyBvh& self) { return self.bvh().depth(); })
-        .def_property_readonly("memory", [](const PyBvh& self) {
-            return self.bvh().bytes();
-        })
-        .def_property_readonly("sah", [](const PyBvh& self) {
-            const Bvh::Sah sah = self.bvh().sah();
-            return py::make_tuple(sah.nodes, sah.blocks);
-        })
+        .def_property_readonly("memory", [](const PyBvh& self) { return self.bvh().bytes(); })
+        .def_property_readonly("sah",
+                               [](const PyBvh& self) {
+                                   const Bvh::Sah sah = self.bvh().sah();
+                                   return py::make_tuple(sah.nodes, sah.blocks);
+                               })
         .def("render_rows", &render, py::arg("kernel"), array_arg("camera"), array_arg("image"), py::arg("row_begin"),
              py::arg("row_end"), py::arg("samples"), py::arg("bounces"), py::arg("albedo"), py::arg("seed") = 0,
              py::arg("threads") = 0, py::arg("in_flight") = 0, py::arg("tracer") = py::none());

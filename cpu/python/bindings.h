@@ -1,4 +1,5 @@
-// What the files of bindings share: arguments are checked in Python (wive/scene.py); here only what memory safety needs.
+// What the files of bindings share: arguments are checked in Python (wive/scene.py); here only what memory safety
+// needs.
 #pragma once
 
 #include <pybind11/numpy.h>
@@ -71,8 +72,9 @@ public:
     template <class Real>
     void expect_precision() const {
         expect(std::holds_alternative<Array<Real>>(vertices_),
-               precision_of<Real> == Precision::float32 ? "expected arrays in float64, as the vertices are, got float32"
-                                                        : "expected arrays in float32, as the vertices are, got float64");
+               precision_of<Real> == Precision::float32
+                   ? "expected arrays in float64, as the vertices are, got float32"
+                   : "expected arrays in float32, as the vertices are, got float64");
     }
 
 private:

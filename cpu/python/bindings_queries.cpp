@@ -1,10 +1,10 @@
 // The queries of a tree, as Python calls them.
 #include <optional>
 
-#include "python/bindings.h"
 #include "kernels/dispatch.h"
 #include "kernels/gather.h"
 #include "kernels/trace.h"
+#include "python/bindings.h"
 
 namespace wive {
 namespace {
@@ -16,8 +16,8 @@ struct Rays {
 };
 
 template <class Real>
-Rays<Real> ray_batch(const PyBvh& self, const Array<Real>& origins, const Array<Real>& directions, const Array<Real>& tmin,
-                     const Array<Real>& tmax) {
+Rays<Real> ray_batch(const PyBvh& self, const Array<Real>& origins, const Array<Real>& directions,
+                     const Array<Real>& tmin, const Array<Real>& tmax) {
     self.expect_precision<Real>();
     expect_shape(origins, 3, "origins: expected shape (n, 3)");
     expect_shape(directions, 3, "directions: expected shape (n, 3)");
@@ -35,7 +35,8 @@ template <class Real>
 void trace_released(const PyBvh& self, const std::string& kernel, QueryKind query, const Rays<Real>& rays,
                     const HitBatch<Real>& hits, unsigned threads, unsigned in_flight) {
     const KernelTable<Real>& table = find_kernels<Real>(kernel);
-    const TraceBatch<Real> batch = table.find({query, self.bvh().accuracy(), self.bvh().node_form(), hits.stats != nullptr});
+    const TraceBatch<Real> batch =
+        table.find({query, self.bvh().accuracy(), self.bvh().node_form(), hits.stats != nullptr});
     const BvhView bvh = self.bvh().view();
     py::gil_scoped_release release;
     trace(table, batch, bvh, rays.batch, hits, rays.count, threads, in_flight);
@@ -75,9 +76,8 @@ py::tuple occluded(const PyBvh& self, const std::string& kernel, const Array<Rea
 }
 
 template <class Real>
-py::tuple count(const PyBvh& self, const std::string& kernel, const Array<Real>& origins,
-                const Array<Real>& directions, const Array<Real>& tmin, const Array<Real>& tmax, unsigned threads,
-                unsigned in_flight, bool stats) {
+py::tuple count(const PyBvh& self, const std::string& kernel, const Array<Real>& origins, const Array<Real>& directions,
+                const Array<Real>& tmin, const Array<Real>& tmax, unsigned threads, unsigned in_flight, bool stats) {
     const Rays<Real> rays = ray_batch(self, origins, directions, tmin, tmax);
     const py::ssize_t n = origins.shape(0);
     Array<std::int32_t> counts(n);

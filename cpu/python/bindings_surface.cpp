@@ -3,8 +3,8 @@
 #include <cmath>
 #include <limits>
 
-#include "python/bindings.h"
 #include "core/parallel.h"
+#include "python/bindings.h"
 
 namespace wive {
 namespace {
@@ -13,8 +13,8 @@ constexpr std::size_t hits_per_chunk = 1 << 12;
 
 // Calls row(i, corners of hit i, three values of the answer) for every hit, in double, on every core.
 template <class Real, class Row>
-py::array_t<double> each_hit(const Array<Real>& vertices, const Array<std::int32_t>& faces, const Array<std::int32_t>& prim,
-                             const Row& row) {
+py::array_t<double> each_hit(const Array<Real>& vertices, const Array<std::int32_t>& faces,
+                             const Array<std::int32_t>& prim, const Row& row) {
     expect_shape(vertices, 3, "vertices: expected shape (v, 3)");
     expect_shape(faces, 3, "faces: expected shape (f, 3)");
     const py::ssize_t count = prim.size();
@@ -22,7 +22,8 @@ py::array_t<double> each_hit(const Array<Real>& vertices, const Array<std::int32
     double* out = answer.mutable_data();
     const std::int32_t *prims = prim.data(), *corners = faces.data();
     const Real* points = vertices.data();
-    const auto face_count = static_cast<std::size_t>(faces.shape(0)), point_count = static_cast<std::size_t>(vertices.shape(0));
+    const auto face_count = static_cast<std::size_t>(faces.shape(0)),
+               point_count = static_cast<std::size_t>(vertices.shape(0));
     const auto hits = static_cast<std::size_t>(count);
     py::gil_scoped_release release;
     Threads threads(hits > hits_per_chunk ? thread_count(0) : 1);
@@ -56,15 +57,14 @@ double normal_along(const double (&corner)[3][3], int axis) {
 }
 
 template <class Real>
-py::array_t<double> points(const Array<Real>& vertices, const Array<std::int32_t>& faces, const Array<std::int32_t>& prim,
-                           const Array<Real>& uv) {
+py::array_t<double> points(const Array<Real>& vertices, const Array<std::int32_t>& faces,
+                           const Array<std::int32_t>& prim, const Array<Real>& uv) {
     expect_shape(uv, 2, "uv: expected shape (n, 2)");
     expect(uv.shape(0) == prim.size(), "uv: expected as many as prim");
     const Real* weights = uv.data();
     return each_hit(vertices, faces, prim, [=](std::size_t i, bool known, const double (&corner)[3][3], double* out) {
         const double u = weights[2 * i], v = weights[2 * i + 1];
-        for (int axis = 0; axis < 3; ++axis)
-            out[axis] = known ? on_triangle(corner, u, v, axis) : nan;
+        for (int axis = 0; axis < 3; ++axis) out[axis] = known ? on_triangle(corner, u, v, axis) : nan;
     });
 }
 
@@ -78,12 +78,13 @@ py::array_t<double> normals(const Array<Real>& vertices, const Array<std::int32_
     });
 }
 
-// Where rays meet the planes of the triangles they hit, in double whatever the tree's precision; the point at u and v where
-// a ray is so flat that its plane says little.
+// Where rays meet the planes of the triangles they hit, in double whatever the tree's precision; the point at u and v
+// where a ray is so flat that its plane says little.
 template <class Real>
 py::array_t<double> points_on_rays(const Array<double>& vertices, const Array<std::int32_t>& faces,
-                                   const Array<std::int32_t>& prim, const Array<Real>& uv, const Array<std::int64_t>& ray,
-                                   const Array<double>& origins, const Array<double>& directions) {
+                                   const Array<std::int32_t>& prim, const Array<Real>& uv,
+                                   const Array<std::int64_t>& ray, const Array<double>& origins,
+                                   const Array<double>& directions) {
     constexpr double grazing = 1e-3;  // the sine of the angle
     expect_shape(uv, 2, "uv: expected shape (n, 2)");
     expect_shape(origins, 3, "origins: expected shape (n, 3)");
@@ -120,7 +121,8 @@ py::array_t<double> points_on_rays(const Array<double>& vertices, const Array<st
 
 void bind_surface(py::module_& m) {
     for_each_precision([&]<class Real>(Real) {
-        m.def("surface_points", &points<Real>, array_arg("vertices"), array_arg("faces"), array_arg("prim"), array_arg("uv"));
+        m.def("surface_points", &points<Real>, array_arg("vertices"), array_arg("faces"), array_arg("prim"),
+              array_arg("uv"));
         m.def("points_on_rays", &points_on_rays<Real>, array_arg("vertices"), array_arg("faces"), array_arg("prim"),
               array_arg("uv"), array_arg("ray"), array_arg("origins"), array_arg("directions"));
         m.def("surface_normals", &normals<Real>, array_arg("vertices"), array_arg("faces"), array_arg("prim"));

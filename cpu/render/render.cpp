@@ -121,8 +121,9 @@ private:
         hits.t = t_.data();
         hits.prim = prim_.data();
         hits.uv = uv_.data();
-        wive::trace<float>(job_.kernels, job_.kernels.find({QueryKind::closest, job_.accuracy, job_.nodes, false}), job_.bvh,
-                    {origins_.data(), directions_.data(), &zero, &infinity, 0, 0}, hits, paths_.size(), 1, job_.in_flight);
+        wive::trace<float>(job_.kernels, job_.kernels.find({QueryKind::closest, job_.accuracy, job_.nodes, false}),
+                           job_.bvh, {origins_.data(), directions_.data(), &zero, &infinity, 0, 0}, hits, paths_.size(),
+                           1, job_.in_flight);
     }
 
     // Paths that escape bring the sky's light home; the others bounce, until they have bounced enough.

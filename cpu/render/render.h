@@ -4,9 +4,9 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "kernels/kernels.h"
 #include "build/mesh.h"
 #include "core/vec3.h"
+#include "kernels/kernels.h"
 
 namespace wive {
 
@@ -36,7 +36,7 @@ struct RenderJob {
     int samples, bounces;
     Albedo albedo;
     std::uint32_t seed;
-    float* image;  // (height, width, 3), linear radiance, row 0 at the top
+    float* image;            // (height, width, 3), linear radiance, row 0 at the top
     unsigned in_flight = 0;  // rays interleaved by each thread; 0: chosen by the batch
     ForeignTracer tracer = {};
 };

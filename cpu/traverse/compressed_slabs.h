@@ -12,8 +12,8 @@ struct CompressedPlanes {
     static constexpr bool boxes_are_nested = false;  // each is rounded by the steps of its own node
 
     template <class Float8>
-    [[gnu::always_inline]] static Float8 distance(const Node& node, auto children, std::size_t row, unsigned axis, Float8 rdir,
-                                                  Float8 bias) {
+    [[gnu::always_inline]] static Float8 distance(const Node& node, auto children, std::size_t row, unsigned axis,
+                                                  Float8 rdir, Float8 bias) {
         const Float8 origin = Float8::all(node.origin[axis]), step = Float8::all(node.step[axis]);
         return multiply_add(children(node.planes[0] + row), step * rdir, multiply_add(origin, rdir, bias));
     }

@@ -37,10 +37,10 @@ struct SharedCorners {
         // Where rows begin is known only when the header has come; the cache line behind it need not wait for that.
         __builtin_prefetch(reinterpret_cast<const std::byte*>(&of) + 64);
     }
-    [[gnu::always_inline]] Float4 vertex(std::size_t k, std::size_t axis) const {
-        return pick[k](block.row(axis));
+    [[gnu::always_inline]] Float4 vertex(std::size_t k, std::size_t axis) const { return pick[k](block.row(axis)); }
+    [[gnu::always_inline]] Float4 edge(std::size_t k, std::size_t axis, Float4 v0) const {
+        return vertex(k, axis) - v0;
     }
-    [[gnu::always_inline]] Float4 edge(std::size_t k, std::size_t axis, Float4 v0) const { return vertex(k, axis) - v0; }
     [[gnu::always_inline]] unsigned used(unsigned lanes) const { return lanes & block.used(); }
 };
 

@@ -28,8 +28,7 @@ int compare_with_limit(const GivenRay& ray, const Corners& corners, float limit)
 
 int compare_distances(const GivenRay& ray, const Corners& one, const Corners& other) {
     const int unit = Meeting::unit_of(ray.origin, other.v, Meeting::unit_of(ray.origin, one.v));
-    return Meeting(ray.origin, ray.direction, one.v, unit)
-        .compare(Meeting(ray.origin, ray.direction, other.v, unit));
+    return Meeting(ray.origin, ray.direction, one.v, unit).compare(Meeting(ray.origin, ray.direction, other.v, unit));
 }
 
 }  // namespace wive

@@ -28,13 +28,13 @@ namespace wive {
 // Compressed planes (compressed_slabs.h) are met at fma(byte, step r, fma(origin, r, bias)). step r is exact, the step
 // being a power of two far from underflow; rounding the inner sum adds u(P + O), and the product of the byte 2u P where
 // there is no fused multiply-add. Such planes may lie up to a step outside, which is below P / 60: 15u M in all.
-// A float64 ray meets the same boxes, all of this in float: its direction is rounded, which adds u(P + O) from r; o = origin -
-// centre is taken in double, so that its one rounding to float is the u O above. The triangle tests move vertices sideways
-// by multiples of 2^-53 M; where the weights of a hit have so little to say that they would move it by more, they are taken
-// exactly (triangle_watertight_float64.h), so that a hit lies no more than 3u M aside: 13u M in all with compressed planes.
-// A component smaller than 2^-30 of the longest counts as that, with its sign: along the ray that moves a point by
-// less than 2^-29 M, which the same slack covers. (A subnormal direction stays shorter than 1 when scaled.)
-// Real, of Isa: the caller's numbers, and those of the triangle test.
+// A float64 ray meets the same boxes, all of this in float: its direction is rounded, which adds u(P + O) from r; o =
+// origin - centre is taken in double, so that its one rounding to float is the u O above. The triangle tests move
+// vertices sideways by multiples of 2^-53 M; where the weights of a hit have so little to say that they would move it
+// by more, they are taken exactly (triangle_watertight_float64.h), so that a hit lies no more than 3u M aside: 13u M in
+// all with compressed planes. A component smaller than 2^-30 of the longest counts as that, with its sign: along the
+// ray that moves a point by less than 2^-29 M, which the same slack covers. (A subnormal direction stays shorter than 1
+// when scaled.) Real, of Isa: the caller's numbers, and those of the triangle test.
 template <class Isa>
 struct RayFrame {
     using Real = typename Isa::Real;
@@ -49,7 +49,8 @@ struct RayFrame {
     alignas(16) float far_bias[4];
     Interval<Real> interval;
     Real scale;  // t of the caller's ray = scale * t here
-    std::uint32_t near_row[3], far_row[3];  // in planes from a node's first one: the rows that the ray meets first and last
+    std::uint32_t near_row[3],
+        far_row[3];             // in planes from a node's first one: the rows that the ray meets first and last
     std::uint32_t order_shift;  // of a node's order, four bits a sequence: the octant's, from back to front
     unsigned longest_axis;
 
@@ -64,7 +65,8 @@ struct RayFrame {
         const unsigned in_range = less_equal(abs(caller_origin), Real4::all(max_coordinate<Real>)) &
                                   less_equal(lengths, Real4::all(std::numeric_limits<Real>::max()));
         const Real longest = highest_lane(lengths);
-        if ((in_range != 15u) | (longest == 0) | !(caller_tmin <= caller_tmax)) [[unlikely]] return false;
+        if ((in_range != 15u) | (longest == 0) | !(caller_tmin <= caller_tmax)) [[unlikely]]
+            return false;
 
         using Bits = std::conditional_t<sizeof(Real) == sizeof(float), std::uint32_t, std::uint64_t>;
         constexpr int mantissa = std::numeric_limits<Real>::digits - 1;
@@ -86,7 +88,8 @@ struct RayFrame {
         const Float4 reciprocal = flip_sign(size, scaled);
         const Float4 distance = relative * reciprocal, slack = size * Float4::all(reach * slack_factor);
         const unsigned octant = sign_bits(scaled) & 7u;  // bit a: negative on axis a, from the sign of the reciprocal
-        order_shift = 4 * (7 - octant);  // the stack wants the farthest child first, and octant 7 - o is octant o backwards
+        order_shift =
+            4 * (7 - octant);  // the stack wants the farthest child first, and octant 7 - o is octant o backwards
         longest_axis = static_cast<unsigned>(std::countr_zero(less_equal(Real4::all(longest), lengths)));
         for (unsigned axis = 0; axis < 3; ++axis) {
             near_row[axis] = node_width * (2 * axis + (octant >> axis & 1u));
@@ -107,7 +110,8 @@ struct AxisFrame : RayFrame<Isa> {
     std::uint32_t axis[3];
 
     [[gnu::always_inline]] bool load(const BvhView& bvh, const RayBatch<typename Isa::Real>& rays, std::size_t i) {
-        if (!RayFrame<Isa>::load(bvh, rays, i)) [[unlikely]] return false;
+        if (!RayFrame<Isa>::load(bvh, rays, i)) [[unlikely]]
+            return false;
         constexpr unsigned following = 0b001001;  // the axis after axis i, two bits each
         axis[2] = this->longest_axis;
         axis[0] = following >> 2 * axis[2] & 3u;

@@ -1,8 +1,8 @@
 // The paper's half form: entry and exit distances side by side in one register of sixteen lanes.
 #pragma once
 
-#include "traverse/frame.h"
 #include "core/layout.h"
+#include "traverse/frame.h"
 #include "traverse/simd_avx512.h"
 #include "traverse/slabs.h"
 
@@ -20,7 +20,8 @@ struct HalfSlabs {
     std::size_t near_row[3], far_row[3];  // in planes from the node's first
     unsigned order_shift;
 
-    WIVE_INLINE explicit HalfSlabs(const RayFrame<Isa>& ray) : tmin_and_tmax(both(ray.interval.tmin, -ray.interval.tmax)) {
+    WIVE_INLINE explicit HalfSlabs(const RayFrame<Isa>& ray)
+        : tmin_and_tmax(both(ray.interval.tmin, -ray.interval.tmax)) {
         for (unsigned axis = 0; axis < 3; ++axis) {
             rdir[axis] = both(ray.rdir[axis], -ray.rdir[axis]);
             bias[axis] = both(ray.near_bias[axis], -ray.far_bias[axis]);

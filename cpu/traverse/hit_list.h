@@ -30,7 +30,8 @@ public:
 
     // Throws std::bad_alloc, with the list as it was.
     [[gnu::always_inline]] void add(const FoundHit& hit) {
-        if (next_ == end_) [[unlikely]] grow();
+        if (next_ == end_) [[unlikely]]
+            grow();
         *next_++ = hit;
     }
 

@@ -2,7 +2,8 @@
 //
 // One ray's next node is known only when its last is done, and then it may have to come from memory. Here the others
 // take their turns meanwhile: a ray's next node or leaf is prefetched when it becomes known and visited a round later.
-// Hits are those of the single ray, bit for bit: nothing passes between rays. Rays that go together need no turns: packet.h.
+// Hits are those of the single ray, bit for bit: nothing passes between rays. Rays that go together need no turns:
+// packet.h.
 #pragma once
 
 #include <new>
@@ -32,8 +33,9 @@ class InFlight {
 
 public:
     // Kernels that count do so for each ray alone.
-    using OwnPackets = std::conditional_t<std::is_same_v<Counters, NoCounters> && Together::hits_are_those_of_rays_alone,
-                                          Together, NoPackets>;
+    using OwnPackets =
+        std::conditional_t<std::is_same_v<Counters, NoCounters> && Together::hits_are_those_of_rays_alone, Together,
+                           NoPackets>;
     using State = Flight<typename Triangles<Isa>::Frame, Query, Counters>;
     using Form = typename Slabs<Isa>::Form;
     using Corners = typename Form::template Corners<Isa>;
@@ -96,7 +98,8 @@ private:
     }
 
     // The child on top is next, unless it may be hidden, which a leaf that was begun may not: prefetched now and, where
-    // nothing is left to be done before, waited for in the right queue. Written to all three, and counted in one: no branch.
+    // nothing is left to be done before, waited for in the right queue. Written to all three, and counted in one: no
+    // branch.
     [[gnu::always_inline]] static void wait(const BvhView& bvh, State& f, bool may_hide, bool ready, Ends& ends) {
         Stack::Top top = f.top;
         if constexpr (Query::in_order)
@@ -111,8 +114,9 @@ private:
         ends.done += ready & end;
     }
 
-    // A few nodes are visited before their flights are sorted into queues: the one is without a branch, and what is guessed
-    // wrong in the other throws away little. Not all of them, though: prefetches must have something to hide behind.
+    // A few nodes are visited before their flights are sorted into queues: the one is without a branch, and what is
+    // guessed wrong in the other throws away little. Not all of them, though: prefetches must have something to hide
+    // behind.
     [[gnu::always_inline]] void visit_nodes() {
         constexpr std::ptrdiff_t few = 8;
         const BvhView bvh = bvh_;
@@ -124,7 +128,8 @@ private:
                 State& f = **j;
                 Stack::Top top = f.top;
                 f.counters.inner_node();
-                visit<Query::in_order, Isa>(bvh.template node<Form>(top.child()), Slabs<Isa>(f.ray), f.query.interval.reach(), top);
+                visit<Query::in_order, Isa>(bvh.template node<Form>(top.child()), Slabs<Isa>(f.ray),
+                                            f.query.interval.reach(), top);
                 f.top = top;
             }
             for (; i != next; ++i) wait(bvh, **i, true, true, ends);
@@ -148,7 +153,8 @@ private:
             const bool last_block = leaf_block_count(child) == 1;
             f.counters.block(block);
             if (last_block) f.counters.leaf();
-            top.child() = without_first_block(child, block.units());  // no matter if it was the last: above the top then
+            top.child() =
+                without_first_block(child, block.units());  // no matter if it was the last: above the top then
             top.move(-static_cast<std::ptrdiff_t>(last_block));
             *end = {&f, &block, last_block, Triangles<Isa>(f.ray).find(Corners(block))};
             const bool found = end->found.lanes != 0;
@@ -192,9 +198,8 @@ private:
 };
 
 template <class Isa, template <class> class Slabs, template <class> class Triangles, class Query, class Counters>
-void trace_batch(const BvhView& bvh, const RayBatch<typename Isa::Real>& rays,
-                 const HitBatch<typename Isa::Real>& hits, const RaySource& source, unsigned in_flight,
-                 std::byte* scratch) {
+void trace_batch(const BvhView& bvh, const RayBatch<typename Isa::Real>& rays, const HitBatch<typename Isa::Real>& hits,
+                 const RaySource& source, unsigned in_flight, std::byte* scratch) {
     if (in_flight <= 1) {
         trace_one_by_one<Isa, Slabs, Triangles, Query, Counters>(bvh, rays, hits, source);
     } else {

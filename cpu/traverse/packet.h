@@ -1,9 +1,9 @@
 // Rays that go together: neighbours in the batch, close to each other and in much the same direction.
 //
-// Such rays meet the same nodes. One walk through the tree visits what any of them may meet (packet_slabs.h), for the price of
-// one ray or two; at each leaf, the rays that meet its box are found eight at a time, and each of them is tested as it is
-// when it is alone. Where boxes lie in their parents' boxes, a ray that meets a leaf's has met all above it: every ray
-// comes to the leaves that it comes to alone, in the same order, and its hits are the same bits.
+// Such rays meet the same nodes. One walk through the tree visits what any of them may meet (packet_slabs.h), for the
+// price of one ray or two; at each leaf, the rays that meet its box are found eight at a time, and each of them is
+// tested as it is when it is alone. Where boxes lie in their parents' boxes, a ray that meets a leaf's has met all
+// above it: every ray comes to the leaves that it comes to alone, in the same order, and its hits are the same bits.
 #pragma once
 
 #include <cstddef>
@@ -62,7 +62,9 @@ private:
 
     // Of every step-th ray. What is no number is left to load().
     bool go_together(std::size_t first, unsigned step) const {
-        const auto vector = [](const Real* p, std::size_t i) { return Real4::set(p[3 * i], p[3 * i + 1], p[3 * i + 2], 0); };
+        const auto vector = [](const Real* p, std::size_t i) {
+            return Real4::set(p[3 * i], p[3 * i + 1], p[3 * i + 2], 0);
+        };
         Real4 low_origin = vector(rays_.origins, first), high_origin = low_origin;
         Real4 low_direction = vector(rays_.directions, first), high_direction = low_direction;
         for (std::size_t i = first + step; i < first + width; i += step) {
@@ -78,7 +80,8 @@ private:
                (highest_lane(high_origin - low_origin) <= most_shift * extent);
     }
 
-    // False where a ray hits nothing by rule, or its octant is another's; or its scale, which would make the bounds loose.
+    // False where a ray hits nothing by rule, or its octant is another's; or its scale, which would make the bounds
+    // loose.
     bool load(std::size_t first) {
         Float4 low_rdir{}, high_rdir{}, low_origin{}, high_origin{};
         bounds_.tmin = std::numeric_limits<float>::infinity();
@@ -143,7 +146,8 @@ private:
                 rays_at_leaves_ += static_cast<unsigned>(__builtin_popcount(rays));
                 const Block* block = bvh_.template leaf<Form>(child);
                 bool found = false;
-                for (std::uint32_t count = leaf_block_count(child); rays != 0 && count > 0; --count, block = block->next())
+                for (std::uint32_t count = leaf_block_count(child); rays != 0 && count > 0;
+                     --count, block = block->next())
                     found |= test_block(*block, rays);
                 if (found) reach = farthest_reach();
                 return reach == done;
@@ -158,17 +162,17 @@ private:
             const auto distance = [&](std::size_t row, unsigned axis, const float* bias) {
                 return Form::distance(node, child, row, axis, Float8::load(rdir_[axis] + i), Float8::load(bias + i));
             };
-            const auto meets = entries<Isa>(
-                [&](unsigned axis) { return distance(bounds_.near_row[axis], axis, near_bias_[axis]); },
-                [&](unsigned axis) { return distance(bounds_.far_row[axis], axis, far_bias_[axis]); },
-                Float8::load(tmin_ + i), Float8::load(reach_ + i));
+            const auto meets =
+                entries<Isa>([&](unsigned axis) { return distance(bounds_.near_row[axis], axis, near_bias_[axis]); },
+                             [&](unsigned axis) { return distance(bounds_.far_row[axis], axis, far_bias_[axis]); },
+                             Float8::load(tmin_ + i), Float8::load(reach_ + i));
             rays |= meets.hit.bits() << i;
         }
         return rays;
     }
 
-    // As rays in flight do: first all are asked, then those few that may hit anything are solved. True if there were any;
-    // those that ask nothing more are taken out of the rays.
+    // As rays in flight do: first all are asked, then those few that may hit anything are solved. True if there were
+    // any; those that ask nothing more are taken out of the rays.
     [[gnu::always_inline]] bool test_block(const Block& block, unsigned& rays) {
         const Corners corners(block);
         Candidate* end = candidates_;
@@ -216,10 +220,11 @@ public:
 
     // With fewer rays in flight than a packet has, there are none.
     Packets(const BvhView& bvh, const auto& rays, const auto& hits, unsigned in_flight)
-        : next_try_(in_flight < Together::width ? std::numeric_limits<std::size_t>::max() : 0), packet_(bvh, rays, hits) {}
+        : next_try_(in_flight < Together::width ? std::numeric_limits<std::size_t>::max() : 0),
+          packet_(bvh, rays, hits) {}
 
-    // Answers rays from `next` on if enough of them go together, and moves next past them; true then. Where they don't, or
-    // it did not pay, more and more of the rays behind are let pass before it is tried again.
+    // Answers rays from `next` on if enough of them go together, and moves next past them; true then. Where they don't,
+    // or it did not pay, more and more of the rays behind are let pass before it is tried again.
     [[gnu::always_inline]] bool answer(std::size_t& next, std::size_t end) {
         if (next < next_try_ || end - next < Together::width) return false;
         const auto outcome = packet_.trace(next);

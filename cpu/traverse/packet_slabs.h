@@ -5,7 +5,8 @@
 
 namespace wive {
 
-// Between what the reciprocals and the origins of a packet's rays lie. They share the octant, and with it rows and order.
+// Between what the reciprocals and the origins of a packet's rays lie. They share the octant, and with it rows and
+// order.
 struct PacketBounds {
     float rdir[2][3];                 // lowest and highest
     float near_from[3], far_from[3];  // from where near planes and far planes are met first and last
@@ -53,8 +54,8 @@ struct PacketSlabs {
             return Form::distance(node, children, far_row[axis], axis, rdir[end][axis], far_bias[end][axis]);
         };
         return Form::of_children(node, entries<Isa>([&](unsigned axis) { return min(near(axis, 0), near(axis, 1)); },
-                                                    [&](unsigned axis) { return max(far(axis, 0), far(axis, 1)); }, tmin,
-                                                    Float8::all(tmax)));
+                                                    [&](unsigned axis) { return max(far(axis, 0), far(axis, 1)); },
+                                                    tmin, Float8::all(tmax)));
     }
 };
 

@@ -28,7 +28,8 @@ struct alignas(4 * sizeof(Real)) Nearest {
     // Becomes that hit where it is better: no branch. Returns t, which need not be looked up again.
     [[gnu::always_inline]] Real become_if(bool better, Real hit_t, Real hit_u, Real hit_v, Word hit_prim) {
         typedef Word Words __attribute__((vector_size(4 * sizeof(Word))));
-        const Words hit = {std::bit_cast<Word>(hit_t), std::bit_cast<Word>(hit_u), std::bit_cast<Word>(hit_v), hit_prim};
+        const Words hit = {std::bit_cast<Word>(hit_t), std::bit_cast<Word>(hit_u), std::bit_cast<Word>(hit_v),
+                           hit_prim};
         const Word mask = Word{0} - better;
         Words words;
         std::memcpy(&words, this, sizeof words);
@@ -96,8 +97,8 @@ struct AnyHit {
 
 // Offers the hits in some lanes of a block; true once the query is done.
 template <class Block, class Real, class Query>
-[[gnu::always_inline]] inline bool offer_lanes(const Block& block, unsigned lanes, const Real (&ts)[4], const Real (&us)[4],
-                                               const Real (&vs)[4], Query& query) {
+[[gnu::always_inline]] inline bool offer_lanes(const Block& block, unsigned lanes, const Real (&ts)[4],
+                                               const Real (&us)[4], const Real (&vs)[4], Query& query) {
     for (; lanes != 0; lanes &= lanes - 1) {
         const int lane = __builtin_ctz(lanes);
         if (query.offer(ts[lane], us[lane], vs[lane], static_cast<std::uint32_t>(block.prim_at(lane)))) return true;

@@ -1,9 +1,9 @@
 // What queries for everything along a ray keep of the hits they are offered.
 #pragma once
 
-#include "traverse/hit_list.h"
 #include "core/interval.h"
 #include "core/ray.h"
+#include "traverse/hit_list.h"
 
 namespace wive {
 

@@ -1,8 +1,8 @@
 // The closest hit in exact mode.
 #pragma once
 
-#include "traverse/exact_hit.h"
 #include "core/layout.h"
+#include "traverse/exact_hit.h"
 #include "traverse/query.h"
 
 namespace wive {

@@ -92,7 +92,8 @@ struct SseFloat4 {
         return static_cast<unsigned>(_mm_movemask_ps(_mm_cmp_ps(a.v, b.v, _CMP_LT_OQ)));
     }
     // Lanes where a <= b, c <= d and e < f.
-    WIVE_INLINE friend unsigned all_in_order(SseFloat4 a, SseFloat4 b, SseFloat4 c, SseFloat4 d, SseFloat4 e, SseFloat4 f) {
+    WIVE_INLINE friend unsigned all_in_order(SseFloat4 a, SseFloat4 b, SseFloat4 c, SseFloat4 d, SseFloat4 e,
+                                             SseFloat4 f) {
         const __m128 ab = _mm_cmp_ps(a.v, b.v, _CMP_LE_OQ), cd = _mm_cmp_ps(c.v, d.v, _CMP_LE_OQ);
         return static_cast<unsigned>(_mm_movemask_ps(_mm_and_ps(_mm_and_ps(ab, cd), _mm_cmp_ps(e.v, f.v, _CMP_LT_OQ))));
     }
@@ -102,8 +103,8 @@ struct SseFloat4 {
     // Lanes where low >= 0 or high <= 0.
     WIVE_INLINE friend unsigned one_sided(SseFloat4 low, SseFloat4 high) {
         const __m128 zero = _mm_setzero_ps();
-        return static_cast<unsigned>(_mm_movemask_ps(
-            _mm_or_ps(_mm_cmp_ps(low.v, zero, _CMP_GE_OQ), _mm_cmp_ps(high.v, zero, _CMP_LE_OQ))));
+        return static_cast<unsigned>(
+            _mm_movemask_ps(_mm_or_ps(_mm_cmp_ps(low.v, zero, _CMP_GE_OQ), _mm_cmp_ps(high.v, zero, _CMP_LE_OQ))));
     }
 };
 
@@ -158,8 +159,8 @@ struct AvxOrder {
     WIVE_INLINE AvxOrder(const std::uint8_t (*row)[3], unsigned shift) {
         const auto four_lanes = [&](int lane) { return _mm_loadu_si128(reinterpret_cast<const __m128i*>(row + lane)); };
         const __m256i bytes = _mm256_inserti128_si256(_mm256_castsi128_si256(four_lanes(0)), four_lanes(4), 1);
-        const __m256i spread = _mm256_broadcastsi128_si256(
-            _mm_setr_epi8(0, 1, 2, -1, 3, 4, 5, -1, 6, 7, 8, -1, 9, 10, 11, -1));
+        const __m256i spread =
+            _mm256_broadcastsi128_si256(_mm_setr_epi8(0, 1, 2, -1, 3, 4, 5, -1, 6, 7, 8, -1, 9, 10, 11, -1));
         slots = _mm256_srl_epi32(_mm256_shuffle_epi8(bytes, spread), _mm_cvtsi32_si128(static_cast<int>(shift)));
     }
 };

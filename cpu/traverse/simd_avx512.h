@@ -24,7 +24,9 @@ struct Avx512 {
         __m256 hits, distances;
 
         WIVE_INLINE Lanes(Order order, Hits by_slot, Float8 tnear, const std::uint32_t* child)
-            : children(_mm256_load_si256(reinterpret_cast<const __m256i*>(child))), hits(by_slot.v), distances(tnear.v) {
+            : children(_mm256_load_si256(reinterpret_cast<const __m256i*>(child))),
+              hits(by_slot.v),
+              distances(tnear.v) {
             if constexpr (in_order) {
                 children = _mm256_permutevar8x32_epi32(children, order.slots);
                 hits = _mm256_permutevar8x32_ps(hits, order.slots);

@@ -1,9 +1,9 @@
 // The ray against a node's eight boxes.
 #pragma once
 
+#include "core/layout.h"
 #include "traverse/corners.h"
 #include "traverse/frame.h"
-#include "core/layout.h"
 
 namespace wive {
 
@@ -22,7 +22,9 @@ struct AllChildren {
 template <class Float8>
 struct OneChild {
     unsigned lane;
-    [[gnu::always_inline]] Float8 operator()(const auto* row) const { return Float8::all(static_cast<float>(row[lane])); }
+    [[gnu::always_inline]] Float8 operator()(const auto* row) const {
+        return Float8::all(static_cast<float>(row[lane]));
+    }
 };
 
 [[gnu::always_inline]] inline const float* planes_from(const Node& node, std::size_t plane) {
@@ -42,21 +44,25 @@ struct Float32Form {
 
     // Along a ray to the planes that stand in this row: plane * rdir + bias.
     template <class Float8>
-    [[gnu::always_inline]] static Float8 distance(const Node& node, auto children, std::size_t row, unsigned, Float8 rdir,
-                                                  Float8 bias) {
+    [[gnu::always_inline]] static Float8 distance(const Node& node, auto children, std::size_t row, unsigned,
+                                                  Float8 rdir, Float8 bias) {
         return multiply_add(children(planes_from(node, row)), rdir, bias);
     }
     // Without the lanes that have no child.
     template <class Entries>
-    [[gnu::always_inline]] static Entries of_children(const Node&, Entries entries) { return entries; }
+    [[gnu::always_inline]] static Entries of_children(const Node&, Entries entries) {
+        return entries;
+    }
 };
 
 // A frame counts in four bits a sequence.
 template <class Form>
-[[gnu::always_inline]] constexpr unsigned order_shift_of(unsigned shift) { return shift * Form::order_bits / 4; }
+[[gnu::always_inline]] constexpr unsigned order_shift_of(unsigned shift) {
+    return shift * Form::order_bits / 4;
+}
 
-// Entry and exit distances, cut to [tmin, tmax]; a child is hit where entry <= exit. Near and far say where an axis' planes
-// are met, of a node's children or, for as many rays, of one child.
+// Entry and exit distances, cut to [tmin, tmax]; a child is hit where entry <= exit. Near and far say where an axis'
+// planes are met, of a node's children or, for as many rays, of one child.
 template <class Isa>
 [[gnu::always_inline]] inline Entries<Isa> entries(const auto& near, const auto& far, typename Isa::Float8 tmin,
                                                    typename Isa::Float8 tmax) {
@@ -90,10 +96,15 @@ struct RaySlabs {
 
     [[gnu::always_inline]] Entries<Isa> test(const Node& node, float tmax) const {
         constexpr AllChildren<Float8> children;
-        return Form::of_children(node, entries<Isa>(
-            [&](unsigned axis) { return Form::distance(node, children, near_row[axis], axis, rdir[axis], near_bias[axis]); },
-            [&](unsigned axis) { return Form::distance(node, children, far_row[axis], axis, rdir[axis], far_bias[axis]); },
-            tmin, Float8::all(tmax)));
+        return Form::of_children(
+            node, entries<Isa>(
+                      [&](unsigned axis) {
+                          return Form::distance(node, children, near_row[axis], axis, rdir[axis], near_bias[axis]);
+                      },
+                      [&](unsigned axis) {
+                          return Form::distance(node, children, far_row[axis], axis, rdir[axis], far_bias[axis]);
+                      },
+                      tmin, Float8::all(tmax)));
     }
 };
 

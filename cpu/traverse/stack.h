@@ -32,7 +32,8 @@ struct alignas(64) Stack {
         }
         [[gnu::always_inline]] float& distance(std::ptrdiff_t i = 0) const { return distance_[i]; }
         [[gnu::always_inline]] std::uint32_t& child(std::ptrdiff_t i = 0) const {
-            return *reinterpret_cast<std::uint32_t*>(reinterpret_cast<std::byte*>(distance_ + i) + sizeof(float) * size);
+            return *reinterpret_cast<std::uint32_t*>(reinterpret_cast<std::byte*>(distance_ + i) +
+                                                     sizeof(float) * size);
         }
         [[gnu::always_inline]] void move(std::ptrdiff_t entries) { distance_ += entries; }
 

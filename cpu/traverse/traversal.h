@@ -1,15 +1,15 @@
 // WiVe: single-ray traversal of the 8-wide tree, the same steps for every node whatever it holds.
 //
 // Fuetterling, Lojewski, Pfreundt, Hamann, Ebert: "Accelerated Single Ray Tracing for Wide Vector Units", HPG 2017.
-// Isa picks the instruction set, Slabs the form of the slab test and of the nodes, Triangles the accuracy, Query what is asked,
-// Counters whether steps are counted. A kernel holds only the code of what it was made for.
+// Isa picks the instruction set, Slabs the form of the slab test and of the nodes, Triangles the accuracy, Query what
+// is asked, Counters whether steps are counted. A kernel holds only the code of what it was made for.
 #pragma once
 
-#include "traverse/frame.h"
 #include "core/layout.h"
+#include "core/ray.h"
+#include "traverse/frame.h"
 #include "traverse/query.h"
 #include "traverse/query_all.h"
-#include "core/ray.h"
 #include "traverse/stack.h"
 
 namespace wive {
@@ -62,20 +62,21 @@ template <class Corners, class Triangles, class Query, class Counters>
 // Visits an inner node: the children that the ray meets go onto the stack, and top moves to the last of them, the
 // nearest; or to the entry below, where none was met. No branch: the same steps for no hit and for eight.
 template <bool in_order, class Isa, class Slabs>
-[[gnu::always_inline]] inline void visit(const typename Slabs::Node& node, const Slabs& slabs, float tmax, Stack::Top& top) {
-    const auto order = slabs.order(node);                                                     // (A) order
-    const auto [tnear, hit] = slabs.test(node, tmax);                                         // (B) slabs
-    const typename Isa::template Lanes<in_order> lanes(order, hit, tnear, node.child);        // (C) permute,
-    lanes.compress_to(top);                                                                   //     compress,
-    top.move(static_cast<std::ptrdiff_t>(hit.count()) - 1);                                   // (D) store
+[[gnu::always_inline]] inline void visit(const typename Slabs::Node& node, const Slabs& slabs, float tmax,
+                                         Stack::Top& top) {
+    const auto order = slabs.order(node);                                               // (A) order
+    const auto [tnear, hit] = slabs.test(node, tmax);                                   // (B) slabs
+    const typename Isa::template Lanes<in_order> lanes(order, hit, tnear, node.child);  // (C) permute,
+    lanes.compress_to(top);                                                             //     compress,
+    top.move(static_cast<std::ptrdiff_t>(hit.count()) - 1);                             // (D) store
 }
 
 // The same for one ray on its own, whose next step can't begin before the next child is known: branches for what need
 // not wait for the permute and the stack. Nothing hit: predicted, the processor goes on with what lies below on
 // the stack while this node's boxes are still being decided. One child hit: it is next, and the stack stays as it is.
-// 40 cycles a node without them, 21 with them, where rays are alike (docs/design.md). Without an order there is no permute to
-// wait for: the node itself has the child, one hit or several.
-// Children are prefetched when they come to lie one and two below the top: the top is needed at once anyway.
+// 40 cycles a node without them, 21 with them, where rays are alike (docs/design.md). Without an order there is no
+// permute to wait for: the node itself has the child, one hit or several. Children are prefetched when they come to lie
+// one and two below the top: the top is needed at once anyway.
 template <bool in_order, class Isa, class Slabs>
 [[gnu::always_inline]] inline std::uint32_t visit_and_take(const BvhView& bvh, const typename Slabs::Node& node,
                                                            const Slabs& slabs, float tmax, Stack::Top& top) {
@@ -106,7 +107,8 @@ template <bool in_order, class Isa, class Slabs>
 
 // What ray i asks, before anything is found. Only the query for every hit knows whose hits they are.
 template <class Query, class Isa>
-[[gnu::always_inline]] inline Query query_of(const RayFrame<Isa>& ray, const HitBatch<typename Isa::Real>& hits, std::size_t i) {
+[[gnu::always_inline]] inline Query query_of(const RayFrame<Isa>& ray, const HitBatch<typename Isa::Real>& hits,
+                                             std::size_t i) {
     if constexpr (requires { &Query::found; })
         return {.interval = ray.interval, .scale = ray.scale, .ray = i, .found = hits.found};
     else
@@ -121,7 +123,8 @@ template <bool in_order, class Isa, class Slabs>
     using Form = typename Slabs::Form;
     Stack::Top top(stack);
     std::uint32_t child = inner_child(0);  // the root
-    if constexpr (in_order) top.distance() = -std::numeric_limits<float>::infinity();  // looked at where one child is hit
+    if constexpr (in_order)
+        top.distance() = -std::numeric_limits<float>::infinity();  // looked at where one child is hit
     const auto take_next = [&] {
         top.move(-1);
         child = top.child();
@@ -158,7 +161,8 @@ template <class Isa, template <class> class Slabs, template <class> class Triang
         [&](std::uint32_t child, const Stack::Top&) {
             counters.leaf();
             const Triangles<Isa> triangles(ray);  // made here: registers are for what nodes need
-            return test_leaf<Corners>(bvh.template leaf<Form>(child), leaf_block_count(child), triangles, query, counters);
+            return test_leaf<Corners>(bvh.template leaf<Form>(child), leaf_block_count(child), triangles, query,
+                                      counters);
         });
     result = query;
 }

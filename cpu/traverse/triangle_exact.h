@@ -4,9 +4,9 @@
 
 #include <cmath>
 
+#include "core/layout.h"
 #include "traverse/exact_hit.h"
 #include "traverse/frame.h"
-#include "core/layout.h"
 
 namespace wive {
 
@@ -16,14 +16,15 @@ template <class Isa>
 struct ExactFrame : AxisFrame<Isa> {
     float given_direction[3];
     float given_tmin, given_tmax;
-    float unscale;     // t here = unscale * t of the caller's ray
-    double from[3];    // the origin, in the order of the axes, as the next two are
-    double shear[2];   // the direction over that on the longest axis
-    double inverse;    // 1 / the direction on the longest axis
-    double bound;      // no weight in the whole tree is off by more
+    float unscale;    // t here = unscale * t of the caller's ray
+    double from[3];   // the origin, in the order of the axes, as the next two are
+    double shear[2];  // the direction over that on the longest axis
+    double inverse;   // 1 / the direction on the longest axis
+    double bound;     // no weight in the whole tree is off by more
 
     [[gnu::always_inline]] bool load(const BvhView& bvh, const RayBatch<float>& rays, std::size_t i) {
-        if (!AxisFrame<Isa>::load(bvh, rays, i)) [[unlikely]] return false;
+        if (!AxisFrame<Isa>::load(bvh, rays, i)) [[unlikely]]
+            return false;
         using Float4 = typename Isa::Float4;
         const auto& axis = this->axis;
         const float *o = rays.origins + 3 * i, *d = rays.directions + 3 * i;
@@ -77,7 +78,9 @@ public:
         auto& [lanes, x, y, z, weight] = found;
         const Double4 shear_x = Double4::all(ray_.shear[0]), shear_y = Double4::all(ray_.shear[1]);
         for (unsigned k = 0; k < 3; ++k) {
-            const auto away = [&](int i) { return widen(corners.vertex(k, ray_.axis[i])) - Double4::all(ray_.from[i]); };
+            const auto away = [&](int i) {
+                return widen(corners.vertex(k, ray_.axis[i])) - Double4::all(ray_.from[i]);
+            };
             z[k] = away(2);
             x[k] = away(0) - shear_x * z[k];
             y[k] = away(1) - shear_y * z[k];
@@ -101,8 +104,8 @@ public:
         const Double4 along = max(abs(near), abs(far));
         Double4 aside = max(abs(x[0]), abs(y[0]));
         for (int k = 1; k < 3; ++k) aside = max(aside, max(abs(x[k]), abs(y[k])));
-        const Double4 error = (aside + Double4::all(4 * e) * along) *
-                              (Double4::all(13 * e) * aside + Double4::all(21 * e) * along);
+        const Double4 error =
+            (aside + Double4::all(4 * e) * along) * (Double4::all(13 * e) * aside + Double4::all(21 * e) * along);
         const Double4 minus_error = Double4::all(0.0) - error;
         unsigned lanes = may_be_hit & (less_equal(minus_error, low) | less_equal(high, error));
         if (lanes == 0) return false;
@@ -151,7 +154,8 @@ private:
     struct Rounded {
         Float4 low, high;
 
-        [[gnu::always_inline]] Rounded(Double4 x, Double4 error) : low(Float4::narrow(x - error)), high(Float4::narrow(x + error)) {}
+        [[gnu::always_inline]] Rounded(Double4 x, Double4 error)
+            : low(Float4::narrow(x - error)), high(Float4::narrow(x + error)) {}
         // Returns the lanes in doubt.
         [[gnu::always_inline]] unsigned store(float (&rounded)[4]) const {
             (low + Float4::all(0.0f)).store(rounded);  // no -0

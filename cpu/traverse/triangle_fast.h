@@ -1,8 +1,9 @@
-// Moeller and Trumbore 1997 on four triangles: fast, and as exact as a scene's numbers are. Neighbours may disagree on an edge.
+// Moeller and Trumbore 1997 on four triangles: fast, and as exact as a scene's numbers are. Neighbours may disagree on
+// an edge.
 #pragma once
 
-#include "traverse/frame.h"
 #include "core/layout.h"
+#include "traverse/frame.h"
 #include "traverse/query.h"
 
 namespace wive {

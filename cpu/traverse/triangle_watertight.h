@@ -10,8 +10,8 @@
 
 #include <cmath>
 
-#include "traverse/frame.h"
 #include "core/layout.h"
+#include "traverse/frame.h"
 #include "traverse/query.h"
 #include "traverse/triangle_watertight_float64.h"
 
@@ -24,7 +24,8 @@ struct WatertightFrame : AxisFrame<Isa> {
     Real shear[2];
 
     [[gnu::always_inline]] bool load(const BvhView& bvh, const RayBatch<Real>& rays, std::size_t i) {
-        if (!AxisFrame<Isa>::load(bvh, rays, i)) [[unlikely]] return false;
+        if (!AxisFrame<Isa>::load(bvh, rays, i)) [[unlikely]]
+            return false;
         for (int k = 0; k < 2; ++k) {
             shear[k] = this->direction[this->axis[k]] / this->direction[this->axis[2]];
             // Smaller slopes move nothing by as much as rounding does; without them no product underflows.
@@ -81,8 +82,8 @@ public:
         if constexpr (precision_of<Real> == Precision::float64) {
             const Sheared<Corners> sheared(*this, corners);
             Solution64<Isa> hits;
-            const unsigned lanes = hits.solve(found.lanes, sheared.x, sheared.y, sheared.z, sheared.weight,
-                                              ray_.direction[axis_[2]]);
+            const unsigned lanes =
+                hits.solve(found.lanes, sheared.x, sheared.y, sheared.z, sheared.weight, ray_.direction[axis_[2]]);
             return offer_lanes(corners.block, lanes, hits.t, hits.u, hits.v, query);
         } else {
             unsigned lanes = found.lanes;
@@ -121,7 +122,8 @@ private:
     [[gnu::always_inline]] void intersect(const Corners& corners, unsigned lanes, Float4 side, float (&ts)[4],
                                           float (&us)[4], float (&vs)[4]) const {
         const Double4 forward = Double4::all(ray_.direction[axis_[2]]);
-        const Double4 shear_x = Double4::all(ray_.direction[axis_[0]]), shear_y = Double4::all(ray_.direction[axis_[1]]);
+        const Double4 shear_x = Double4::all(ray_.direction[axis_[0]]),
+                      shear_y = Double4::all(ray_.direction[axis_[1]]);
         Double4 x[3], y[3], z[3], weight[3];
         for (unsigned k = 0; k < 3; ++k) {
             const auto away = [&](int i) { return widen(corners.vertex(k, axis_[i])) - widen(origin_[i]); };

@@ -1,10 +1,11 @@
-// Where a ray meets triangles of doubles, from the weights of triangle_watertight.h. There is no wider type to take them in
-// again: where their rounding shows, they are taken without it, by products whose rounded-off part is known (Dekker 1971).
+// Where a ray meets triangles of doubles, from the weights of triangle_watertight.h. There is no wider type to take
+// them in again: where their rounding shows, they are taken without it, by products whose rounded-off part is known
+// (Dekker 1971).
 //
-// e = 2^-53; x, y and z are the rounded corners, exact from here on. A weight is off by less than 4e X Y, X the largest |x|, Y
-// the largest |y| of the lane, so that the convex combination of corners that a hit is lies no more than 12e X^2 Y / W
-// aside of the ray, W the weights' sum. Down to W = 2^-26 X Y that is 1.5u X < 3u M in the units of frame.h, which the boxes'
-// slack covers: t always lies where the triangle's boxes are looked for.
+// e = 2^-53; x, y and z are the rounded corners, exact from here on. A weight is off by less than 4e X Y, X the largest
+// |x|, Y the largest |y| of the lane, so that the convex combination of corners that a hit is lies no more than 12e X^2
+// Y / W aside of the ray, W the weights' sum. Down to W = 2^-26 X Y that is 1.5u X < 3u M in the units of frame.h,
+// which the boxes' slack covers: t always lies where the triangle's boxes are looked for.
 #pragma once
 
 #include <cstddef>
@@ -14,7 +15,8 @@
 
 namespace wive {
 
-// x1 y2 - y1 x2 with the exact sign, and zero only where it is zero: the sum of two products and of what was rounded off.
+// x1 y2 - y1 x2 with the exact sign, and zero only where it is zero: the sum of two products and of what was rounded
+// off.
 [[gnu::always_inline]] inline double exact_weight(double x1, double y1, double x2, double y2) {
     const double a = x1 * y2, b = y1 * x2;
     const double a_low = rounded_off_product(x1, y2, a), b_low = -rounded_off_product(y1, x2, b);
@@ -30,8 +32,8 @@ class Solution64 {
 public:
     alignas(32) double t[4], u[4], v[4];
 
-    [[gnu::always_inline]] unsigned solve(unsigned lanes, const Double4 (&x)[3], const Double4 (&y)[3], const Double4 (&z)[3],
-                                          const Double4 (&weight)[3], double forward) {
+    [[gnu::always_inline]] unsigned solve(unsigned lanes, const Double4 (&x)[3], const Double4 (&y)[3],
+                                          const Double4 (&z)[3], const Double4 (&weight)[3], double forward) {
         const Double4 det = weight[0] + weight[1] + weight[2], zero = Double4::all(0.0);
         const Double4 height = weight[0] * z[0] + weight[1] * z[1] + weight[2] * z[2];
         (height / (det * Double4::all(forward))).store(t);
@@ -57,7 +59,9 @@ private:
         alignas(32) double x[3][4], y[3][4], z[3][4];
     };
 
-    [[gnu::always_inline]] static Double4 largest(const Double4 (&a)[3]) { return max(max(abs(a[0]), abs(a[1])), abs(a[2])); }
+    [[gnu::always_inline]] static Double4 largest(const Double4 (&a)[3]) {
+        return max(max(abs(a[0]), abs(a[1])), abs(a[2]));
+    }
 
     // The lanes in doubt again, with exact signs: on both sides of the ray, or edge-on, is a miss.
     [[gnu::noinline]] unsigned solve_exactly(unsigned lanes, unsigned doubt, const Corners& corners, double forward) {

@@ -115,9 +115,7 @@ def exact_triangles(lanes: SimpleNamespace, form: SimpleNamespace, kept: int) ->
 
     @without_gradient
     @wp.func(inline=False)
-    def solve(
-        units: wp.uint64, block: int, j: int, stack: stack_argument, best_t: float, crossings: bool
-    ):
+    def solve(units: wp.uint64, block: int, j: int, stack: stack_argument, best_t: float, crossings: bool):
         """t, u, v and 1; a 0 last where the ray misses the triangle or meets it outside its limits.
 
         Also where it meets it beyond best_t, in the caller's units.
