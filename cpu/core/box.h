@@ -1,4 +1,4 @@
-// An axis-aligned box for the builder, two four-wide vectors; the fourth lane is free for the owner's use.
+// The builder's axis-aligned box: two four-lane vectors. Lane 3 is not part of the box; PrimRef keeps data in it.
 #pragma once
 
 #include <cstdint>
@@ -6,13 +6,14 @@
 
 namespace wive {
 
-// GCC's and Clang's portable vectors: SSE on x86, NEON on Arm.
+// Portable vectors of GCC and Clang: SSE on x86, NEON on Arm.
 typedef float Float4v __attribute__((vector_size(16)));
 typedef std::int32_t Int4v __attribute__((vector_size(16)));
 
 inline Float4v minimum(Float4v a, Float4v b) { return a < b ? a : b; }
 inline Float4v maximum(Float4v a, Float4v b) { return a > b ? a : b; }
 
+// Empty until grown: lo is infinity and hi is -infinity.
 struct Box {
     Float4v lo = Float4v{} + std::numeric_limits<float>::infinity();
     Float4v hi = Float4v{} - std::numeric_limits<float>::infinity();
@@ -25,7 +26,8 @@ struct Box {
         lo = minimum(lo, point);
         hi = maximum(hi, point);
     }
-    // Half the surface area, the probability measure of the surface area heuristic.
+    // Half the surface area. SAH takes the ratio of two boxes' areas as the probability that a ray through the outer
+    // box meets the inner one.
     float half_area() const {
         const Float4v d = hi - lo;
         return d[0] * d[1] + d[1] * d[2] + d[2] * d[0];

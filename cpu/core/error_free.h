@@ -1,15 +1,16 @@
-// What rounding takes off a sum or a product of doubles, itself a double. Always inlined, as all that kernels call.
+// Rounding errors of a sum and of a product of doubles, which are doubles themselves. Always inlined, as everything
+// that kernels call (see TriangleBlockOf in layout.h).
 #pragma once
 
 namespace wive {
 
-// a + b less sum, which is a + b rounded: Knuth's two-sum.
+// (a + b) - sum, where sum is a + b rounded: Knuth's two-sum.
 [[gnu::always_inline]] inline double rounded_off_sum(double a, double b, double sum) {
     const double b_part = sum - a;
     return (a - (sum - b_part)) + (b - b_part);
 }
 
-// x y less product, which is x y rounded: exact where it does not underflow, |x y| being zero or above 2^-916.
+// x y - product, where product is x y rounded. Exact unless it underflows: |x y| must be zero or above 2^-916.
 [[gnu::always_inline]] inline double rounded_off_product(double x, double y, double product) {
     return __builtin_fma(x, y, -product);
 }

@@ -1,4 +1,4 @@
-// Where along a ray hits count.
+// The interval of a ray's parameter t in which hits count, and rounding to float towards either infinity.
 #pragma once
 
 #include <bit>
@@ -7,17 +7,19 @@
 
 namespace wive {
 
-// The float nearest to x on the side of -infinity, and of infinity.
+// float_below: the largest float not above x. float_above: the smallest float not below x.
 [[gnu::always_inline]] inline float float_below(double x) {
     const float f = static_cast<float>(x);
     if (!(f > x)) return f;
-    const auto bits = std::bit_cast<std::int32_t>(f);  // not zero: that is above x only where x rounds to -0
+    // f > x and f == 0: a negative x was rounded to -0.
     if (f == 0) return -std::numeric_limits<float>::denorm_min();
+    const auto bits = std::bit_cast<std::int32_t>(f);
     return std::bit_cast<float>(bits > 0 ? bits - 1 : bits + 1);
 }
 [[gnu::always_inline]] inline float float_above(double x) { return -float_below(-x); }
 
-// [tmin, tmax], closed. Boxes are met in float, from entry() to reach(), which no hit in the interval lies outside.
+// The closed interval [tmin, tmax]. Slab tests are in float for either precision: box_tmin() and box_tmax() are the
+// interval's ends rounded outwards, so that no box with a hit in the interval is missed.
 template <class Real>
 struct Interval;
 
@@ -25,8 +27,8 @@ template <>
 struct Interval<float> {
     float tmin, tmax;
 
-    [[gnu::always_inline]] float entry() const { return tmin; }
-    [[gnu::always_inline]] float reach() const { return tmax; }
+    [[gnu::always_inline]] float box_tmin() const { return tmin; }
+    [[gnu::always_inline]] float box_tmax() const { return tmax; }
     [[gnu::always_inline]] bool holds(float t) const { return t >= tmin && t <= tmax; }
     [[gnu::always_inline]] void end_at(float t) { tmax = t; }
     [[gnu::always_inline]] static Interval of(float tmin, float tmax) { return {tmin, tmax}; }
@@ -35,14 +37,14 @@ struct Interval<float> {
 template <>
 struct Interval<double> {
     double tmin, tmax;
-    float box_tmin, box_tmax;
+    float tmin_below, tmax_above;
 
-    [[gnu::always_inline]] float entry() const { return box_tmin; }
-    [[gnu::always_inline]] float reach() const { return box_tmax; }
+    [[gnu::always_inline]] float box_tmin() const { return tmin_below; }
+    [[gnu::always_inline]] float box_tmax() const { return tmax_above; }
     [[gnu::always_inline]] bool holds(double t) const { return t >= tmin && t <= tmax; }
     [[gnu::always_inline]] void end_at(double t) {
         tmax = t;
-        box_tmax = float_above(t);
+        tmax_above = float_above(t);
     }
     [[gnu::always_inline]] static Interval of(double tmin, double tmax) {
         return {tmin, tmax, float_below(tmin), float_above(tmax)};

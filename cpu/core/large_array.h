@@ -1,7 +1,8 @@
-// An uninitialised array on huge pages where the system has them: a tree is visited at random, and every visit
-// to a page that the translation buffer has forgotten costs as much as a missed cache line.
+// An uninitialised array, on huge pages if the system has them. Traversal reads a tree in random order, and a page that
+// misses the TLB costs as much as a cache miss.
 #pragma once
 
+#include <cassert>
 #include <cstddef>
 #include <cstdlib>
 #include <memory>
@@ -22,9 +23,9 @@ public:
     LargeArray() = default;
     explicit LargeArray(std::size_t size) : size_(size) {
         if (size == 0) return;
-        constexpr std::size_t huge_page = std::size_t{2} << 20;
+        constexpr std::size_t huge_page = std::size_t{2} << 20, cache_line = 64;
         const std::size_t bytes = size * sizeof(T);
-        const std::size_t alignment = bytes >= huge_page ? huge_page : 64;
+        const std::size_t alignment = bytes >= huge_page ? huge_page : cache_line;
         const std::size_t rounded = (bytes + alignment - 1) / alignment * alignment;
         data_.reset(static_cast<T*>(std::aligned_alloc(alignment, rounded)));
         if (!data_) throw std::bad_alloc();
@@ -37,8 +38,14 @@ public:
     const T* data() const { return data_.get(); }
     std::size_t size() const { return size_; }
     std::size_t bytes() const { return size_ * sizeof(T); }
-    T& operator[](std::size_t i) { return data_.get()[i]; }
-    const T& operator[](std::size_t i) const { return data_.get()[i]; }
+    T& operator[](std::size_t i) {
+        assert(i < size_);
+        return data_.get()[i];
+    }
+    const T& operator[](std::size_t i) const {
+        assert(i < size_);
+        return data_.get()[i];
+    }
 
 private:
     struct Free {

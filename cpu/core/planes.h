@@ -1,4 +1,5 @@
-// Box planes relative to a tree's centre, rounded outwards so that a box never shrinks.
+// Box planes relative to a tree's centre, rounded outwards: lower planes down, upper planes up, so that a box never
+// shrinks.
 #pragma once
 
 #include <cmath>
@@ -14,7 +15,7 @@ inline float plane_below(float plane, float center) {
     const bool above = static_cast<double>(p) > static_cast<double>(plane) - center;
     return above ? std::nextafter(p, -std::numeric_limits<float>::infinity()) : p;
 }
-// The difference of doubles is rounded as well: what that took off decides where the rest is a float.
+// The difference of doubles is rounded as well. Its rounding error decides if the rounded difference is a float.
 inline float plane_below(double plane, float center) {
     const double b = -static_cast<double>(center), p = plane + b;
     const double rest = rounded_off_sum(plane, b, p);

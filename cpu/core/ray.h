@@ -1,4 +1,4 @@
-// Rays and hits as the kernels see them.
+// Batches of rays and hits, as kernels read and write them.
 #pragma once
 
 #include <cstddef>
@@ -6,7 +6,7 @@
 
 namespace wive {
 
-// Batches are flat arrays. tmin and tmax have one value for all rays (stride 0) or one a ray (stride 1).
+// Rays in flat arrays. tmin and tmax have one value for all rays (stride 0) or one per ray (stride 1).
 template <class Real>
 struct RayBatch {
     const Real* origins;     // (n, 3)
@@ -19,21 +19,21 @@ struct RayBatch {
 template <class Real>
 class HitList;
 
-// Where results go; a null pointer is an output nobody asked for.
+// Output arrays of a query. A null pointer is an output that the query does not write.
 template <class Real>
 struct HitBatch {
     Real* t = nullptr;               // (n,) infinity on a miss
     std::int32_t* prim = nullptr;    // (n,) -1 on a miss
     Real* uv = nullptr;              // (n, 2) NaN on a miss
-    bool* occluded = nullptr;        // (n,) any-hit queries write only this
-    std::int32_t* stats = nullptr;   // (n, 3) inner nodes, leaves, triangles
-    std::int32_t* count = nullptr;   // (n,) hits of each ray, where all are asked for
-    HitList<Real>* found = nullptr;  // and the hits themselves: a list for each worker of the batch
+    bool* occluded = nullptr;        // (n,) the only output of any-hit queries
+    std::int32_t* stats = nullptr;   // (n, 3) inner nodes visited, leaves visited, triangles tested
+    std::int32_t* count = nullptr;   // (n,) number of hits, for count and all-hits queries
+    HitList<Real>* found = nullptr;  // all-hits queries: one list per worker thread of the batch
 };
 
-// Hands out the rays of a batch, a run at a time, to all the threads that trace it.
+// Hands out the rays of a batch to the threads that trace it, one run of consecutive rays at a time.
 struct RaySource {
-    std::size_t* next;  // shared; the first ray that nobody has taken
+    std::size_t* next;  // shared by the threads: the first ray not yet handed out
     std::size_t count, run;
 
     [[gnu::always_inline]] bool take(std::size_t& begin, std::size_t& end) const {
@@ -43,8 +43,10 @@ struct RaySource {
     }
 };
 
+// Most rays that one thread interleaves.
 inline constexpr int max_in_flight = 64;
 
+// The prim of a miss and of an unused lane; -1 when read as int32.
 inline constexpr std::uint32_t no_prim = 0xffffffffu;
 
 }  // namespace wive

@@ -103,7 +103,7 @@ private:
     [[gnu::always_inline]] static void wait(const BvhView& bvh, State& f, bool may_hide, bool ready, Ends& ends) {
         Stack::Top top = f.top;
         if constexpr (Query::in_order)
-            while (may_hide & (top.distance() > f.query.interval.reach())) top.move(-1);
+            while (may_hide & (top.distance() > f.query.interval.box_tmax())) top.move(-1);
         f.top = top;
         const std::uint32_t child = top.child();
         prefetch<Form>(bvh, child);
@@ -129,7 +129,7 @@ private:
                 Stack::Top top = f.top;
                 f.counters.inner_node();
                 visit<Query::in_order, Isa>(bvh.template node<Form>(top.child()), Slabs<Isa>(f.ray),
-                                            f.query.interval.reach(), top);
+                                            f.query.interval.box_tmax(), top);
                 f.top = top;
             }
             for (; i != next; ++i) wait(bvh, **i, true, true, ends);

@@ -100,8 +100,8 @@ private:
                 near_bias_[axis][i] = ray.near_bias[axis];
                 far_bias_[axis][i] = ray.far_bias[axis];
             }
-            tmin_[i] = ray.interval.entry();
-            reach_[i] = ray.interval.reach();
+            tmin_[i] = ray.interval.box_tmin();
+            reach_[i] = ray.interval.box_tmax();
             bounds_.tmin = tmin_[i] < bounds_.tmin ? tmin_[i] : bounds_.tmin;
             new (&query_[i]) Query(query_of<Query>(ray, hits_, first + i));
         }
@@ -183,7 +183,7 @@ private:
         }
         for (const Candidate* c = candidates_; c != end; ++c) {
             const bool ends = Triangles<Isa>(ray_[c->ray]).solve(corners, c->found, query_[c->ray]);
-            reach_[c->ray] = ends ? done : query_[c->ray].interval.reach();
+            reach_[c->ray] = ends ? done : query_[c->ray].interval.box_tmax();
             rays &= ~(static_cast<unsigned>(ends) << c->ray);
         }
         return end != candidates_;

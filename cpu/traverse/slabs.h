@@ -81,7 +81,7 @@ struct RaySlabs {
     std::size_t near_row[3], far_row[3];  // in planes from the node's first
     unsigned order_shift;
 
-    [[gnu::always_inline]] explicit RaySlabs(const RayFrame<Isa>& ray) : tmin(Float8::all(ray.interval.entry())) {
+    [[gnu::always_inline]] explicit RaySlabs(const RayFrame<Isa>& ray) : tmin(Float8::all(ray.interval.box_tmin())) {
         for (unsigned axis = 0; axis < 3; ++axis) {
             rdir[axis] = Float8::all(ray.rdir[axis]);
             near_bias[axis] = Float8::all(ray.near_bias[axis]);

@@ -156,7 +156,7 @@ template <class Isa, template <class> class Slabs, template <class> class Triang
     Query query = result;
     Stack stack;
     walk<Query::in_order, Isa>(
-        bvh, Slabs<Isa>(ray), stack, [&] { return query.interval.reach(); },
+        bvh, Slabs<Isa>(ray), stack, [&] { return query.interval.box_tmax(); },
         [&](std::uint32_t, const Stack::Top&) { counters.inner_node(); },
         [&](std::uint32_t child, const Stack::Top&) {
             counters.leaf();
