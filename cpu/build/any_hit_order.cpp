@@ -22,7 +22,7 @@ std::uint32_t reversed(std::uint32_t sequence, int count) {
 
 Coverage::Coverage(const BinaryTree& tree, Threads& threads)
     : in_chunk_before_(tree.count + 1), chunks_before_(tree.count / chunk_size + 1) {
-    parallel_chunks_apart(chunks_before_.size(), chunks_per_task, threads, [&](std::size_t begin, std::size_t end) {
+    parallel_chunks_scattered(chunks_before_.size(), chunks_per_task, threads, [&](std::size_t begin, std::size_t end) {
         for (std::size_t chunk = begin; chunk < end; ++chunk) {
             const std::size_t first = chunk * chunk_size, last = std::min<std::size_t>(first + chunk_size, tree.count);
             float sum = 0;

@@ -213,7 +213,7 @@ private:
             places[i + 1] = {places[i][0] + left, places[i][1] + std::min(chunk_size, size - i * chunk_size) - left};
         }
         std::vector<std::array<Range, 2>> sides(chunks);
-        parallel_chunks_apart(size, chunk_size, threads_, [&](std::size_t begin, std::size_t end) {
+        parallel_chunks_scattered(size, chunk_size, threads_, [&](std::size_t begin, std::size_t end) {
             const std::size_t chunk = begin / chunk_size;
             partition_chunk(from + first + begin, from + first + end, bin_of, split, places[chunk]);
             for (std::size_t side = 0; side < 2; ++side)

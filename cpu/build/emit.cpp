@@ -71,7 +71,7 @@ public:
         first_leaf_unit_ = node_bytes / unit_bytes;
         const std::size_t count = subtrees.size() + 1;  // and the top
         parallel_for(count, threads, [&](std::size_t i) {
-            const std::size_t k = far_apart(i, count);
+            const std::size_t k = scattered(i, count);
             if (k == subtrees.size()) {
                 std::size_t next_node = 1;
                 const Part* next_subtree = subtrees.data();

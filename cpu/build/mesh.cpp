@@ -203,7 +203,7 @@ PrimRefs make_prim_refs(const Mesh<Real>& mesh, const Point& center, Threads& th
         Box box, centroids;
     };
     std::vector<Part> parts(chunks);
-    parallel_chunks_apart(mesh.face_count, chunk_size, threads, [&](std::size_t begin, std::size_t end) {
+    parallel_chunks_scattered(mesh.face_count, chunk_size, threads, [&](std::size_t begin, std::size_t end) {
         PrimRef* to = all.refs.data() + begin;
         Part part;
         for (std::size_t face = begin; face < end; ++face) {

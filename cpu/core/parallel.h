@@ -1,8 +1,9 @@
-// Work spread over threads that live for one call: nothing is left running, so a process may fork at any time.
+// Loops over several threads. The threads live for one call: none is left running, so a process may fork at any time.
 #pragma once
 
 #include <algorithm>
 #include <atomic>
+#include <cassert>
 #include <chrono>
 #include <condition_variable>
 #include <cstddef>
@@ -18,9 +19,9 @@
 
 namespace wive {
 
-// As many threads as asked for; 0 is one for each core that this process may run on.
-inline unsigned thread_count(unsigned asked) {
-    if (asked > 0) return asked;
+// The number of threads to use: `requested`, or if that is 0, one per core that this process may run on.
+inline unsigned thread_count(unsigned requested) {
+    if (requested > 0) return requested;
 #if defined(__linux__)
     cpu_set_t cores;
     if (sched_getaffinity(0, sizeof(cores), &cores) == 0) return static_cast<unsigned>(CPU_COUNT(&cores));
@@ -28,18 +29,18 @@ inline unsigned thread_count(unsigned asked) {
     return std::max(1u, std::thread::hardware_concurrency());
 }
 
-// Gives other threads the core until ready() or a moment has passed. To wake a sleeping thread takes the system as long
-// as many a piece of work, on virtual cores longer; most waiting here is shorter than that.
+// Yields the core until ready(), for 200 us at most. Most waits here are shorter than the system takes to wake a thread
+// that sleeps on a condition variable, on virtual cores above all.
 template <class Ready>
-void wait_a_moment(const Ready& ready) {
+void yield_until(const Ready& ready) {
     using Clock = std::chrono::steady_clock;
     for (const auto end = Clock::now() + std::chrono::microseconds(200); !ready() && Clock::now() < end;)
         std::this_thread::yield();
 }
 
-// The calling thread and, once there is work for them, up to count - 1 helpers, which wait between one piece of work
-// and the next, soon asleep, and end with this object. A helper that the system has not woken yet is not waited for, so
-// on a busy machine the caller goes on alone.
+// The calling thread and up to count - 1 helper threads, started on first use and joined by the destructor. An idle
+// helper yields for a while, then sleeps. for_each never waits for a helper that has not begun, so on a busy machine
+// the calling thread does the work alone.
 class Threads {
 public:
     explicit Threads(unsigned count) : count_(count) {}
@@ -54,15 +55,15 @@ public:
         for (std::thread& helper : helpers_) helper.join();
     }
 
-    // Calls work(i) once for every i in [0, count). The first exception of any of them is thrown again here, once all
-    // have stopped.
+    // Calls work(i) once for every i in [0, count). If calls throw, the first exception is thrown again here, after all
+    // threads have stopped.
     template <class Work>
     void for_each(std::size_t count, const Work& work) {
         Job job = {count, [](const void* w, std::size_t i) { (*static_cast<const Work*>(w))(i); }, &work};
         const std::size_t wanted = std::min<std::size_t>(count_, count);
-        if (wanted > 1) offer(job, wanted - 1);
+        if (wanted > 1) start(job, wanted - 1);
         job.run();
-        if (wanted > 1) withdraw();
+        if (wanted > 1) finish();
         if (job.failure) std::rethrow_exception(job.failure);
     }
 
@@ -85,11 +86,12 @@ private:
         }
     };
 
-    void offer(Job& job, std::size_t helpers) {
+    // Hands the job to the helpers.
+    void start(Job& job, std::size_t helpers) {
         try {
             while (helpers_.size() < helpers) helpers_.emplace_back([this] { help(); });
         } catch (...) {
-            // The machine has no more threads to give: the ones we have do the work.
+            // The system refused another thread: those that exist do the work.
         }
         {
             const std::lock_guard lock(mutex_);
@@ -99,21 +101,24 @@ private:
         wake_.notify_all();
     }
 
-    void withdraw() {
+    // Takes the job back and waits for the helpers that have begun.
+    void finish() {
         {
             const std::lock_guard lock(mutex_);
             job_ = nullptr;
         }
-        wait_a_moment([this] { return working_ == 0; });
+        yield_until([this] { return working_ == 0; });
         std::unique_lock lock(mutex_);
         idle_.wait(lock, [this] { return working_ == 0; });
     }
 
+    // A helper's loop.
     void help() {
         for (std::size_t last = 0;;) {
-            wait_a_moment([&] { return ending_ || job_number_ != last; });
+            yield_until([&] { return ending_ || job_number_ != last; });
             std::unique_lock lock(mutex_);
-            if (!job_ && !ending_ && job_number_ != last) {  // missed: the next may come soon, too
+            if (!job_ && !ending_ && job_number_ != last) {
+                // The job ended before this helper began: yield again, until the next.
                 last = job_number_;
                 continue;
             }
@@ -133,9 +138,9 @@ private:
     std::vector<std::thread> helpers_;
     std::mutex mutex_;
     std::condition_variable wake_, idle_;
-    // Written under the mutex; those that are atomic are watched without it.
-    Job* job_ = nullptr;                       // null: nothing to do
-    std::atomic<std::size_t> job_number_ = 0;  // so that a helper takes each job once
+    // Written under the mutex. The atomic ones are read without it while yielding.
+    Job* job_ = nullptr;                       // null: no work
+    std::atomic<std::size_t> job_number_ = 0;  // tells jobs apart, so that a helper takes each once
     std::atomic<unsigned> working_ = 0;
     std::atomic<bool> ending_ = false;
 };
@@ -145,33 +150,35 @@ void parallel_for(std::size_t count, Threads& threads, const Work& work) {
     threads.for_each(count, work);
 }
 
-// The same on threads of its own.
+// parallel_for on threads that live for this call.
 template <class Work>
 void parallel_for(std::size_t count, unsigned threads, const Work& work) {
     Threads(threads).for_each(count, work);
 }
 
-// The same in chunks of a fixed size: work(begin, end). Chunks do not depend on the number of threads.
+// Calls work(begin, end) for chunks of a fixed size. The chunks do not depend on the number of threads.
 template <class Work>
 void parallel_chunks(std::size_t count, std::size_t chunk, Threads& threads, const Work& work) {
     threads.for_each((count + chunk - 1) / chunk,
                      [&](std::size_t i) { work(i * chunk, std::min(count, (i + 1) * chunk)); });
 }
 
-// The i-th of the numbers below count in an order whose neighbours lie far apart, by steps of the golden ratio. For
-// work that fills fresh memory: threads side by side in it would each clear the same huge page.
-inline std::size_t far_apart(std::size_t i, std::size_t count) {
+// The i-th number of a permutation of [0, count) whose neighbours lie far apart: steps of the golden ratio, 144 / 89
+// being consecutive Fibonacci numbers. For work that fills fresh memory: threads that fill adjacent parts of it would
+// each clear the same huge page.
+inline std::size_t scattered(std::size_t i, std::size_t count) {
+    assert(i < count);
     std::size_t step = count * 89 / 144;
     while (std::gcd(step, count) != 1) ++step;
     return i * step % count;
 }
 
-// parallel_chunks in that order.
+// parallel_chunks in scattered() order.
 template <class Work>
-void parallel_chunks_apart(std::size_t count, std::size_t chunk, Threads& threads, const Work& work) {
+void parallel_chunks_scattered(std::size_t count, std::size_t chunk, Threads& threads, const Work& work) {
     const std::size_t chunks = (count + chunk - 1) / chunk;
     threads.for_each(chunks, [&](std::size_t i) {
-        const std::size_t begin = far_apart(i, chunks) * chunk;
+        const std::size_t begin = scattered(i, chunks) * chunk;
         work(begin, std::min(count, begin + chunk));
     });
 }

@@ -139,9 +139,10 @@ private:
             }
             if (bounce == job_.bounces) continue;
             const auto prim = static_cast<std::size_t>(prim_[i]);
-            const Vec3 a = load_vec3(job_.mesh.corner(prim, 0)), b = load_vec3(job_.mesh.corner(prim, 1)),
-                       c = load_vec3(job_.mesh.corner(prim, 2));
-            const Vec3 normal = unit_normal(a, b, c);
+            const float* const corner[3] = {job_.mesh.corner(prim, 0), job_.mesh.corner(prim, 1),
+                                            job_.mesh.corner(prim, 2)};
+            const Vec3 normal = unit_normal(corner[0], corner[1], corner[2]);
+            const Vec3 a = load_vec3(corner[0]), b = load_vec3(corner[1]), c = load_vec3(corner[2]);
             if (job_.albedo == Albedo::normals)
                 path.throughput = path.throughput * (normal * 0.5f + Vec3{0.5f, 0.5f, 0.5f});
             else
