@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cassert>
 #include <cstdint>
 #include <limits>
 
@@ -10,19 +11,21 @@ namespace {
 
 constexpr std::size_t chunks_per_task = 64;
 
-// The sequence backwards; unused places stay behind it.
+// The sequence of the first `count` slots backwards; the places behind them are zero.
 std::uint32_t reversed(std::uint32_t sequence, int count) {
     sequence = (sequence & 0x0f0f0f0fu) << 4 | (sequence >> 4 & 0x0f0f0f0fu);
     sequence = (sequence & 0x00ff00ffu) << 8 | (sequence >> 8 & 0x00ff00ffu);
     sequence = sequence << 16 | sequence >> 16;
-    return count == 0 ? 0 : sequence >> 4 * (node_width - count);
+    return count == 0 ? 0 : sequence >> order_bits * (node_width - count);
 }
+
+std::uint32_t slot_at(std::uint32_t sequence, std::size_t place) { return sequence >> order_bits * place & 7u; }
 
 }  // namespace
 
-Coverage::Coverage(const BinaryTree& tree, Threads& threads)
+ProjectedAreaPrefixSum::ProjectedAreaPrefixSum(const BinaryTree& tree, Threads& threads)
     : in_chunk_before_(tree.count + 1), chunks_before_(tree.count / chunk_size + 1) {
-    parallel_chunks_scattered(chunks_before_.size(), chunks_per_task, threads, [&](std::size_t begin, std::size_t end) {
+    const auto sum_chunks = [&](std::size_t begin, std::size_t end) {
         for (std::size_t chunk = begin; chunk < end; ++chunk) {
             const std::size_t first = chunk * chunk_size, last = std::min<std::size_t>(first + chunk_size, tree.count);
             float sum = 0;
@@ -33,7 +36,8 @@ Coverage::Coverage(const BinaryTree& tree, Threads& threads)
             if (last == tree.count && last < first + chunk_size) in_chunk_before_[last] = sum;
             chunks_before_[chunk] = static_cast<double>(sum);
         }
-    });
+    };
+    parallel_chunks_scattered(chunks_before_.size(), chunks_per_task, threads, sum_chunks);
     double sum = 0;
     for (double& chunk : chunks_before_) {
         const double own = chunk;
@@ -42,32 +46,34 @@ Coverage::Coverage(const BinaryTree& tree, Threads& threads)
     }
 }
 
-void stand_for_any_hit(const BinaryTree& tree, const Coverage& coverage, Treelet& treelet) {
+void sort_slots_for_any_hit(const BinaryTree& tree, const ProjectedAreaPrefixSum& areas, Treelet& treelet) {
     const auto count = static_cast<std::size_t>(treelet.count);
-    // Squared, which ranks alike. Lanes without a slot rank behind all others.
-    alignas(16) std::array<float, node_width> worth;
-    worth.fill(std::numeric_limits<float>::infinity());
+    // Squares of the scores, which sort alike. Lanes without a slot sort last.
+    alignas(16) std::array<float, node_width> score;
+    score.fill(std::numeric_limits<float>::infinity());
     for (std::size_t i = 0; i < count; ++i) {
         const Subtree& slot = treelet.slots[i].tree;
         const float area = tree.box_of(slot).half_area();
-        const float covered = area > 0 ? static_cast<float>(coverage.of(slot)) / area : 0;
-        worth[i] = std::min(covered * covered / static_cast<float>(slot.size()), std::numeric_limits<float>::max());
+        const float covered = area > 0 ? static_cast<float>(areas.of(slot)) / area : 0;
+        score[i] = std::min(covered * covered / static_cast<float>(slot.size()), std::numeric_limits<float>::max());
     }
     alignas(16) std::array<std::uint32_t, node_width> place{};
     for (std::size_t k = 0; k < node_width; ++k)
-        for (std::size_t i = 0; i < node_width; ++i) place[i] += k < i ? worth[k] <= worth[i] : worth[k] < worth[i];
+        for (std::size_t i = 0; i < node_width; ++i) place[i] += k < i ? score[k] <= score[i] : score[k] < score[i];
     const std::array<Slot, node_width> slots = treelet.slots;
-    std::uint32_t places = 0;  // four bits each
+    std::uint32_t places = 0;  // place of every slot, order_bits each
     for (std::size_t i = 0; i < count; ++i) {
         treelet.slots[place[i]] = slots[i];
-        places |= place[i] << 4 * i;
+        places |= place[i] << order_bits * i;
     }
-    for (std::size_t octant = 0; octant < 4; ++octant) {
+    for (std::size_t octant = 0; octant < octants / 2; ++octant) {
+        const std::size_t opposite = octants - 1 - octant;
         const std::uint32_t sequence = treelet.order[octant];
-        std::uint32_t moved = 0;
-        for (std::size_t i = 0; i < count; ++i) moved |= (places >> 4 * (sequence >> 4 * i & 7u) & 7u) << 4 * i;
-        treelet.order[octant] = moved;
-        treelet.order[7 - octant] = reversed(moved, treelet.count);
+        assert(treelet.order[opposite] == reversed(sequence, treelet.count));  // join() makes it so
+        std::uint32_t renumbered = 0;
+        for (std::size_t i = 0; i < count; ++i) renumbered |= slot_at(places, slot_at(sequence, i)) << order_bits * i;
+        treelet.order[octant] = renumbered;
+        treelet.order[opposite] = reversed(renumbered, treelet.count);
     }
 }
 

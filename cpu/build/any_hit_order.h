@@ -1,5 +1,5 @@
-// Where the children of a node stand. Closest hits follow the order row and do not depend on it. Any-hit queries take
-// children as they stand, the last first: those stand last that are likely to hold a hit, and soon.
+// Slot order for any-hit queries. Any-hit traversal ignores the order row and visits slots last to first, so the child
+// most likely to give a cheap hit goes last. Closest-hit traversal follows the order row and does not depend on it.
 #pragma once
 
 #include <cstddef>
@@ -12,29 +12,30 @@
 
 namespace wive {
 
-// Sums of the projected areas of a subtree's triangles, without visiting them.
-class Coverage {
+// The sum of the projected areas of any subtree's triangles, as a difference of two prefix sums over the references.
+class ProjectedAreaPrefixSum {
 public:
-    Coverage() = default;
-    Coverage(const BinaryTree& tree, Threads& threads);
+    ProjectedAreaPrefixSum() = default;
+    ProjectedAreaPrefixSum(const BinaryTree& tree, Threads& threads);
 
     double of(const Subtree& tree) const { return before(tree.end) - before(tree.begin); }
 
 private:
-    // Short, so that single precision will do within: what a leaf's triangles cover is a difference of two sums.
+    // Short enough for sums in single precision: a leaf's area is a difference of two of them.
     static constexpr std::size_t chunk_size = 64;
 
     double before(std::size_t ref) const {
         return chunks_before_[ref / chunk_size] + static_cast<double>(in_chunk_before_[ref]);
     }
 
-    LargeArray<float> in_chunk_before_;  // of the references before this one, in its chunk
-    std::vector<double> chunks_before_;
+    LargeArray<float> in_chunk_before_;  // per reference: the sum over its chunk up to it
+    std::vector<double> chunks_before_;  // per chunk: the sum over the chunks before it
 };
 
-// Moves the slots of a treelet to where they shall stand, and its order with them. A slot's worth is how much of its
-// box its triangles cover, which is how likely a ray through the box hits one, over the square root of their number,
-// which stands for the time to find out (after Ize and Hansen 2011, "RTSAH Traversal Order for Occlusion Rays").
-void stand_for_any_hit(const BinaryTree& tree, const Coverage& coverage, Treelet& treelet);
+// Sorts a treelet's slots by rising score and renumbers the slots in its order. The score is that of Ize and Hansen
+// 2011, "RTSAH Traversal Order for Occlusion Rays": the part of the slot's box that its triangles cover, which is the
+// probability that a ray through the box hits one, over the square root of their number, which estimates the time to
+// find that hit.
+void sort_slots_for_any_hit(const BinaryTree& tree, const ProjectedAreaPrefixSum& areas, Treelet& treelet);
 
 }  // namespace wive

@@ -14,8 +14,9 @@ namespace wive {
 namespace {
 
 constexpr std::size_t chunk_size = 1 << 13;        // references per step of a parallel split
-constexpr std::uint32_t parallel_range = 1 << 15;  // larger ranges are split by all threads together
-// Smaller ones are split further until there are about so many tasks, or they are too small to be worth handing out.
+constexpr std::uint32_t parallel_range = 1 << 15;  // each larger range is split by all threads
+// Smaller ranges are split by one thread each, until there are about task_count of them or they are smaller than
+// smallest_task, for which a task of its own costs more than it saves.
 constexpr std::uint32_t task_count = 64, smallest_task = 1 << 12;
 
 struct Halves {
@@ -28,18 +29,18 @@ struct Halves {
           axis(split_axis) {}
 };
 
-// A range near the root, whose halves are items themselves, or one that a single thread builds the subtree of.
+// A range near the root. Its halves are items too, or else one thread builds the subtree over it.
 struct Item {
     Range range;
-    bool in_scratch;       // where its references are
+    bool in_scratch;       // whether its references are in tree.nodes, else in tree.refs
     std::size_t left = 0;  // its halves are items[left] and items[left + 1]; 0: none
     int axis = 0;
     SlotCosts costs{};
 };
 
-// References lie in two arrays of equal size, tree.refs and tree.nodes. Ranges near the root move from one to the
-// other with every split; afterwards references stay in tree.refs, and the other array takes what a split moves to
-// the right, and finally the nodes.
+// References are in two arrays of equal size, tree.refs and tree.nodes. Near the root, every split moves a range's
+// references from one array to the other. Below, they are in tree.refs, and tree.nodes is first the scratch memory for
+// the right side of a split, then holds the nodes.
 class TreeBuilder {
 public:
     TreeBuilder(BinaryTree& tree, Threads& threads, int depth_limit)
@@ -50,7 +51,7 @@ public:
         for (std::size_t i = 0; i < items_.size(); ++i) {
             if (items_[i].range.tree.size() <= parallel_range) continue;
             const bool from_scratch = items_[i].in_scratch;
-            const Halves halves = split_together(items_[i].range, from_scratch);
+            const Halves halves = split_parallel(items_[i].range, from_scratch);
             items_[i].left = items_.size();
             items_[i].axis = halves.axis;
             items_.push_back({halves.left, !from_scratch});
@@ -76,22 +77,22 @@ public:
     }
 
 private:
-    // Items without halves of more than so many references.
-    std::vector<std::size_t> leaf_items(std::uint32_t more_than) const {
+    // Items without halves of more than `size` references.
+    std::vector<std::size_t> leaf_items(std::uint32_t size) const {
         std::vector<std::size_t> leaves;
         for (std::size_t i = 0; i < items_.size(); ++i)
-            if (items_[i].left == 0 && items_[i].range.tree.size() > more_than) leaves.push_back(i);
+            if (items_[i].left == 0 && items_[i].range.tree.size() > size) leaves.push_back(i);
         return leaves;
     }
 
-    // Splits the items that are too large for a task, each on one thread. False if there are none.
+    // Splits the items that are too large for a task, one thread per item. False if there are none.
     bool split_items() {
         const std::vector<std::size_t> large = leaf_items(std::max(smallest_task, tree_.count / task_count));
         const std::size_t first = items_.size();
         items_.resize(first + 2 * large.size());
         parallel_for(large.size(), threads_, [&](std::size_t i) {
             Item& item = items_[large[i]];
-            const Halves halves = split_alone(item.range, item.in_scratch);
+            const Halves halves = split_serial(item.range, item.in_scratch);
             item.left = first + 2 * i;
             item.axis = halves.axis;
             items_[item.left] = {halves.left, false};
@@ -100,26 +101,26 @@ private:
         return !large.empty();
     }
 
-    // Brings a range's references to tree.refs.
-    PrimRef* fetch(const Range& range, bool from_scratch) const {
+    // Copies a range's references to tree.refs, unless they are there. Returns tree.refs.
+    PrimRef* move_to_refs(const Range& range, bool from_scratch) const {
         const Subtree& r = range.tree;
         if (from_scratch)
             std::copy(tree_.nodes.data() + r.begin, tree_.nodes.data() + r.end, tree_.refs.data() + r.begin);
         return tree_.refs.data();
     }
 
-    // Whether SAH may still choose: halving must be able to finish within the depth that is left.
-    bool may_choose(const Range& range) const {
+    // Whether SAH may choose the split: halving by number must still be able to finish within depth_limit.
+    bool sah_allowed(const Range& range) const {
         return range.depth + static_cast<int>(std::bit_width(blocks_for(range.tree.size()))) < depth_limit_;
     }
 
     // Builds the subtree over a range on this thread.
     SlotCosts build_range(const Range& range, bool from_scratch = false) {
         if (!range.tree.has_node()) {
-            fetch(range, from_scratch);
+            move_to_refs(range, from_scratch);
             return block_costs(range.box);
         }
-        const Halves halves = split_alone(range, from_scratch);
+        const Halves halves = split_serial(range, from_scratch);
         const SlotCosts left = build_range(halves.left);
         const SlotCosts right = build_range(halves.right);
         return store_node(tree_, range.tree, range.box, halves.right.tree.begin, halves.axis, left, right);
@@ -133,7 +134,7 @@ private:
         return axis;
     }
 
-    // Halves by number, along the longest axis where centroids differ: always possible, always balanced.
+    // Splits at the median along the longest axis of the centroids. Possible for any centroids, and balanced.
     static Halves split_by_number(const Range& range, PrimRef* refs) {
         const auto [begin, end, place] = range.tree;
         const int axis = longest_axis(range);
@@ -149,8 +150,8 @@ private:
         return halves;
     }
 
-    // Copies references to where `to` points for their side, without a branch, which no processor could predict. Both
-    // places are written to each time; neither may lie ahead of what is read, except where it is another array.
+    // Copies references to `left` or `right` and advances that pointer. Branch-free, because the side is unpredictable:
+    // every reference is written to both. So neither pointer may be ahead of `ref`, unless it is into another array.
     static void partition(const PrimRef* begin, const PrimRef* end, const BinMap& bin_of, Split split, PrimRef*& left,
                           PrimRef*& right) {
         for (const PrimRef* ref = begin; ref < end; ++ref) {
@@ -163,9 +164,9 @@ private:
         }
     }
 
-    // Leaves both sides in tree.refs.
-    Halves split_alone(const Range& range, bool from_scratch) const {
-        if (!may_choose(range)) return split_by_number(range, fetch(range, from_scratch));
+    // Splits a range on this thread. Both sides are in tree.refs afterwards.
+    Halves split_serial(const Range& range, bool from_scratch) const {
+        if (!sah_allowed(range)) return split_by_number(range, move_to_refs(range, from_scratch));
         const auto [begin, end, place] = range.tree;
         PrimRef *refs = tree_.refs.data(), *scratch = tree_.nodes.data();
         const PrimRef* from = from_scratch ? scratch : refs;
@@ -173,7 +174,7 @@ private:
         Bins bins(bin_of.count);
         bins.add(from + begin, from + end, bin_of);
         const Split split = best_split(bins, bin_of);
-        if (split.axis < 0) return split_by_number(range, fetch(range, from_scratch));
+        if (split.axis < 0) return split_by_number(range, move_to_refs(range, from_scratch));
         PrimRef *left = refs + begin, *right = scratch + begin;
         partition(from + begin, from + end, bin_of, split, left, right);
         Halves halves(range, static_cast<std::uint32_t>(left - refs), split.axis);
@@ -185,9 +186,9 @@ private:
         return halves;
     }
 
-    // The same over all threads: chunks are binned apart, then copied to the other array, each to places known
-    // from the bins. The result depends on the chunks, whose size is fixed, and not on the threads.
-    Halves split_together(const Range& range, bool from_scratch) {
+    // Splits a range on all threads. Each chunk is binned on its own, then copied to the other array, to places that
+    // follow from the bins. The result depends on the chunks, whose size is fixed, and not on the number of threads.
+    Halves split_parallel(const Range& range, bool from_scratch) {
         PrimRef* from = (from_scratch ? tree_.nodes : tree_.refs).data();
         PrimRef* to = (from_scratch ? tree_.refs : tree_.nodes).data();
         const std::uint32_t first = range.tree.begin, size = range.tree.size();
@@ -199,14 +200,15 @@ private:
         });
         Bins bins(bin_of.count);
         for (const Bins& part : parts) bins.add(part, bin_of.count);
-        const Split split = may_choose(range) ? best_split(bins, bin_of) : Split{};
+        const Split split = sah_allowed(range) ? best_split(bins, bin_of) : Split{};
         if (split.axis < 0) {
             const Halves halves = split_by_number(range, from);
             std::copy(from + first, from + range.tree.end, to + first);
             return halves;
         }
         Halves halves(range, first + bins.count_left(split), split.axis);
-        std::vector<std::array<PrimRef*, 2>> places(chunks + 1);  // where each chunk's left and right references go
+        // Where each chunk's left and right references go.
+        std::vector<std::array<PrimRef*, 2>> places(chunks + 1);
         places[0] = {to + first, to + halves.right.tree.begin};
         for (std::size_t i = 0; i < chunks; ++i) {
             const std::size_t left = parts[i].count_left(split);

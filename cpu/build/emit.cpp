@@ -1,6 +1,7 @@
 #include "build/emit.h"
 
 #include <algorithm>
+#include <cassert>
 #include <span>
 #include <stdexcept>
 #include <type_traits>
@@ -12,19 +13,21 @@
 #include "build/write_compressed.h"
 #include "build/write_float32.h"
 #include "build/write_node.h"
+#include "core/ensure.h"
 #include "core/parallel.h"
 
 namespace wive {
 
 namespace {
 
-// Subtrees that one thread emits: about so many, of so many triangles at most and at least.
+// A thread emits one subtree at a time. There are about subtree_count of them, within these numbers of triangles.
 constexpr std::uint32_t subtree_count = 64, largest_subtree = 1 << 14, smallest_subtree = 1 << 10;
 
-// A leaf's triangles by rising number.
+// A leaf's prims in ascending order. choose_collapse makes no leaf of more than max_leaf_blocks.
 class LeafPrims {
 public:
     LeafPrims(const BinaryTree& tree, const Subtree& leaf) : count_(leaf.size()) {
+        ensure(count_ <= prims_.size(), "a leaf of at most max_leaf_blocks blocks");
         for (std::uint32_t i = 0; i < count_; ++i) prims_[i] = tree.refs[leaf.begin + i].prim();
         std::sort(prims_.begin(), prims_.begin() + count_);
     }
@@ -35,7 +38,16 @@ private:
     std::uint32_t count_;
 };
 
-// Plans where everything goes; Writer knows what the nodes and blocks there look like.
+// True if the sequence of every octant has each of the first `count` slots once.
+[[maybe_unused]] bool is_permutation(const SlotSequences& order, int count) {
+    return std::all_of(order.begin(), order.end(), [&](std::uint32_t sequence) {
+        unsigned slots = 0;
+        for (int i = 0; i < count; ++i) slots |= 1u << (sequence >> order_bits * i & 7u);
+        return slots == (1u << count) - 1;
+    });
+}
+
+// Plans the place of every node and leaf, then writes them. Writer has the format of nodes and blocks.
 template <class Writer, class Real>
 class Emitter {
     using StoredNode = typename Writer::Node;
@@ -48,10 +60,10 @@ public:
     using Size = TreeSize;
 
     EmittedTree emit(Threads& threads) {
-        coverage_ = Coverage(tree_, threads);
-        // First the top of the tree, which only plans; then each subtree below it, at a place known by its size.
-        Treelet root = gather_root(tree_);
-        stand_for_any_hit(tree_, coverage_, root);
+        areas_ = ProjectedAreaPrefixSum(tree_, threads);
+        // Plan the top of the tree, measure the subtrees below it, and give each its place. Then write them.
+        Treelet root = collect_root_children(tree_);
+        sort_slots_for_any_hit(tree_, areas_, root);
         std::vector<Part> subtrees;
         Size top = {1, 0};
         plan_top(root, 1, top, subtrees);
@@ -69,16 +81,19 @@ public:
         nodes_ = reinterpret_cast<StoredNode*>(units.data());
         leaves_ = units.data() + node_bytes;
         first_leaf_unit_ = node_bytes / unit_bytes;
-        const std::size_t count = subtrees.size() + 1;  // and the top
+        const std::size_t count = subtrees.size() + 1;  // and one task for the top
         parallel_for(count, threads, [&](std::size_t i) {
             const std::size_t k = scattered(i, count);
             if (k == subtrees.size()) {
                 std::size_t next_node = 1;
                 const Part* next_subtree = subtrees.data();
                 emit_top(root, 0, next_node, next_subtree);
+                ensure(next_node == top.nodes && next_subtree == subtrees.data() + subtrees.size(),
+                       "as many top nodes written as planned");
             } else if (Part& subtree = subtrees[k]; !subtree.slot.leaf) {
                 Size at = subtree.first;
                 subtree.depth += emit_subtree(subtree.slot, subtree.node, at);
+                ensure_filled(subtree, at);
             }
         });
         int depth = 1;
@@ -87,22 +102,29 @@ public:
     }
 
 private:
-    // A slot whose whole content one thread emits, but for its own node's lane in the node above.
+    // A slot of a top node. One thread emits the node or leaf in it and everything below.
     struct Part {
         Slot slot;
-        std::size_t node;  // where its own goes
-        int depth;         // of the node above, the root's being 1; in the end of the deepest below
+        std::size_t node;  // index of its own node
+        int depth;         // planned: of the node above, the root's being 1; emitted: of the deepest node below
         Size size = {}, first = {};
     };
     using Children = std::array<std::uint32_t, node_width>;
 
     static std::uint32_t node_child(std::size_t node) { return inner_child(node * (sizeof(StoredNode) / unit_bytes)); }
 
+    // What was written must be what was planned: the next part begins there.
+    static void ensure_filled(const Part& part, const Size& end) {
+        const Size planned = part.first + part.size;
+        ensure(end.nodes == planned.nodes && end.leaf_units == planned.leaf_units,
+               "as many nodes and leaf units written as planned");
+    }
+
     bool is_top(const Slot& slot) const { return !slot.leaf && slot.tree.size() > subtree_size_; }
 
     Treelet treelet_of(const Slot& slot) const {
-        Treelet treelet = gather_treelet(tree_, slot.tree);
-        stand_for_any_hit(tree_, coverage_, treelet);
+        Treelet treelet = collect_children(tree_, slot.tree);
+        sort_slots_for_any_hit(tree_, areas_, treelet);
         return treelet;
     }
 
@@ -145,14 +167,17 @@ private:
             if (is_top(slot)) {
                 emit_top(treelet_of(slot), node, next_node, next_subtree);
             } else {
-                Size at = next_subtree++->first;
-                if (slot.leaf) child = write_leaf(slot, at);
+                const Part& part = *next_subtree++;
+                if (!slot.leaf) continue;
+                Size at = part.first;
+                child = write_leaf(slot, at);
+                ensure_filled(part, at);
             }
         }
         write_node(nodes_[place], treelet, children);
     }
 
-    // Returns the depth of the subtree, its root counted.
+    // Emits a subtree from `cursor` on. Returns its depth in nodes.
     int emit_subtree(const Slot& slot, std::size_t place, Size& cursor) {
         const Treelet treelet = treelet_of(slot);
         Children children{};
@@ -182,6 +207,7 @@ private:
                                     : options_.order == ChildOrder::diagonal ? sort_along_diagonals(node, treelet.count)
                                     : options_.order == ChildOrder::slots    ? assign_places(node, treelet.count)
                                                                              : shuffle(node, treelet.count);
+        assert(is_permutation(order, treelet.count));
         write_order(node, order, treelet.count);
         Writer::write_node(node, treelet.count, out);
     }
@@ -191,6 +217,7 @@ private:
         const std::size_t first = cursor.leaf_units;
         const LeafSize size = Writer::write_leaf(mesh_, options_.accuracy, prims.span(), leaves_ + first * unit_bytes);
         cursor.leaf_units += size.units;
+        ensure(size.blocks >= 1 && size.blocks <= max_leaf_blocks, "a leaf of 1 to 8 blocks");
         return leaf_child(first_leaf_unit_ + first, size.blocks);
     }
 
@@ -199,7 +226,7 @@ private:
     const BuildOptions& options_;
     const std::array<float, 3>& center_;
     std::uint32_t subtree_size_ = std::clamp(tree_.count / subtree_count, smallest_subtree, largest_subtree);
-    Coverage coverage_;
+    ProjectedAreaPrefixSum areas_;
     StoredNode* nodes_ = nullptr;
     std::byte* leaves_ = nullptr;
     std::size_t first_leaf_unit_ = 0;

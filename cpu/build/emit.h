@@ -1,4 +1,4 @@
-// Writing the tree that was decided: wide nodes and triangle blocks.
+// Writes the collapsed tree to memory: wide nodes and triangle blocks.
 #pragma once
 
 #include <array>
@@ -19,15 +19,15 @@ struct EmittedTree {
     int depth;
 };
 
-// What a leaf takes, the units being those of unit_bytes.
+// The memory that a leaf takes, in units of unit_bytes, and its number of blocks.
 struct LeafSize {
     std::size_t units;
     std::uint32_t blocks;
 };
 
-// Children of a node stand side by side, then subtree after subtree; the same on any number of threads. Throws
-// std::invalid_argument where the tree is larger than child references reach. center: what the tree's boxes are still
-// to be made relative to.
+// The nodes of a node's children are adjacent; then come the nodes below each child in turn. The same bytes on any
+// number of threads. center: the point that planes are made relative to, zero if the tree's boxes already are. Throws
+// std::invalid_argument if the tree has more than max_units.
 template <class Real>
 EmittedTree emit_tree(const BinaryTree& tree, const Mesh<Real>& mesh, const BuildOptions& options,
                       const std::array<float, 3>& center, Threads& threads);
