@@ -6,13 +6,14 @@
 namespace wive {
 namespace {
 
-// Half the areas of three boxes, in the first three lanes.
+// Half the areas of three boxes, in lanes 0 to 2.
 Float4v half_areas(const Box (&box)[3]) {
     const Float4v a = box[0].hi - box[0].lo, b = box[1].hi - box[1].lo, c = box[2].hi - box[2].lo;
     const Float4v xy = __builtin_shufflevector(a, b, 0, 4, 1, 5), z_ = __builtin_shufflevector(a, b, 2, 6, 3, 7);
     const Float4v x = __builtin_shufflevector(xy, c, 0, 1, 4, 5);
     const Float4v y = __builtin_shufflevector(xy, c, 2, 3, 5, 6);
-    const Float4v z = __builtin_shufflevector(z_, c, 0, 1, 6, 6);  // not a fourth lane: its bits are slow denormals
+    // Lane 3 repeats lane 2: the data in a box's own lane 3 are denormals as floats, which are slow.
+    const Float4v z = __builtin_shufflevector(z_, c, 0, 1, 6, 6);
     return x * y + y * z + z * x;
 }
 
@@ -21,8 +22,8 @@ Float4v blocks_of(Int4v prims) {
     return __builtin_convertvector((prims + 3) >> 2, Float4v);
 }
 
-// One side's boxes and counts on each axis, growing bin by bin. An empty side costs infinity times zero, which is
-// no number, and so is never the least.
+// One side of a split: its box and its number of references on each axis, as bins are added. The cost of an empty side
+// is infinity times zero, a NaN, and so never the least.
 struct Sides {
     Box box[3];
     Int4v count = {};
