@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cassert>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -15,21 +16,33 @@ namespace {
 
 constexpr std::uint32_t none = ~0u;
 constexpr std::size_t chunk_size = 1 << 10;  // searches differ much in length
-constexpr int deepest = 512;                 // levels that recursion may go down
-constexpr int rounds = 3;                    // each finds less than half of what the one before did
-// What a move must save, in multiples of the moved subtree's own area. Small savings lower the cost on paper, but not
-// the steps of rays: they make siblings overlap.
+constexpr int max_recursion = 512;           // levels
+constexpr int rounds = 3;                    // each gains less than half of what the one before did
+// What a move must save, in multiples of the moved subtree's own area. Smaller savings lower the SAH cost but not the
+// steps of rays, because they make siblings overlap.
 constexpr float least_gain = 1;
 
-// A node of the tree while it changes. Leaves are the blocks that binning left together: single triangles as leaves
-// take three times as long and leave blocks emptier, for a few more percent on some scenes and fewer on others.
+// A node of the tree while it changes. Leaves are the blocks that binning made. Single triangles as leaves take three
+// times as long and leave blocks emptier, for a cost that is a few percent lower on some scenes and higher on others.
 struct LinkedNode {
     Box box;
-    std::array<std::uint32_t, 2> child;  // a leaf: none, and its first reference
+    std::array<std::uint32_t, 2> child;  // leaves: none, then the first reference
     std::uint32_t parent;
-    std::uint32_t count;  // references below; inner nodes: filled in at the end
+    std::uint32_t count;  // references below; count_refs sets it for inner nodes
 
     bool is_leaf() const { return child[0] == none; }
+    std::uint32_t first_ref() const {
+        assert(is_leaf());
+        return child[1];
+    }
+    std::uint32_t other_child(std::uint32_t node) const {
+        assert(child[0] == node || child[1] == node);
+        return child[0] == node ? child[1] : child[0];
+    }
+    void replace_child(std::uint32_t node, std::uint32_t by) {
+        assert(child[0] == node || child[1] == node);
+        child[child[0] == node ? 0 : 1] = by;
+    }
 };
 static_assert(sizeof(LinkedNode) == 48);
 
@@ -39,9 +52,9 @@ Box joined(const Box& a, const Box& b) {
     return box;
 }
 
-bool same(const Box& a, const Box& b) {
-    const Int4v same = (a.lo == b.lo) & (a.hi == b.hi);
-    return (same[0] & same[1] & same[2]) != 0;
+bool are_equal(const Box& a, const Box& b) {
+    const Int4v equal = (a.lo == b.lo) & (a.hi == b.hi);
+    return (equal[0] & equal[1] & equal[2]) != 0;
 }
 
 class LinkedTree {
@@ -80,26 +93,24 @@ private:
         return place;
     }
 
-    std::uint32_t sibling(std::uint32_t node) const {
-        const auto& child = nodes_[nodes_[node].parent].child;
-        return child[child[0] == node];
-    }
+    std::uint32_t sibling(std::uint32_t node) const { return nodes_[nodes_[node].parent].other_child(node); }
 
-    // The place where the subtree enlarges the tree least. Meister and Bittner's algorithm 2: up from the subtree's
-    // parent, and down into each sibling on the way, unless even the subtree's own area is too much to add there.
+    // The target whose place, shared with the subtree, enlarges the tree least; none if nothing gains least_gain.
+    // Meister and Bittner's algorithm 2: walk up from the subtree's parent and search each sibling's subtree on the
+    // way. Below a node, at least the moved subtree's own area is added, which bounds the search.
     Move find_move(std::uint32_t node, std::vector<std::pair<float, std::uint32_t>>& stack) const {
         const Box box = nodes_[node].box;
         const float area = box.half_area();
         Move best{least_gain * area, node, none};
         std::uint32_t pivot = nodes_[node].parent, other = sibling(node);
-        Box pivot_box = nodes_[other].box;            // of the pivot, without the subtree
-        float saved = nodes_[pivot].box.half_area();  // by taking the subtree out
+        Box pivot_box = nodes_[other].box;            // the pivot's box without the moved subtree
+        float saved = nodes_[pivot].box.half_area();  // area that removing the subtree saves
         for (;;) {
             stack.push_back({saved, other});
             while (!stack.empty()) {
                 const auto [here, target] = stack.back();
                 stack.pop_back();
-                if (!(here - area > best.gain)) continue;  // nor where areas are infinite
+                if (!(here - area > best.gain)) continue;  // also if areas are infinite and the difference is NaN
                 const LinkedNode& at = nodes_[target];
                 const float enlarged = joined(at.box, box).half_area();
                 if (here - enlarged > best.gain) best.gain = here - enlarged, best.target = target;
@@ -117,7 +128,7 @@ private:
         }
     }
 
-    // One round. False where nothing moved.
+    // One round. False if nothing moved.
     bool improve(Threads& threads) {
         std::vector<Move> moves(used_);
         parallel_chunks(used_, chunk_size, threads, [&](std::size_t begin, std::size_t end) {
@@ -136,45 +147,45 @@ private:
         return moved > 0;
     }
 
-    // Moves a subtree if that still gains after the moves before it.
+    // Moves a subtree, if that still gains after the moves before it. False if it does not.
     bool apply(const Move& move) {
         const std::uint32_t parent = nodes_[move.node].parent, other = sibling(move.node);
         if (parent == root_ || move.target == parent || move.target == other) return false;
         float gain = nodes_[parent].box.half_area();
-        gain += take_out(parent, other);
-        bool apart = true;
-        for (std::uint32_t i = move.target; i != none && apart; i = nodes_[i].parent) apart = i != move.node;
-        if (apart) {
-            gain -= put_in(move.node, parent, move.target);
+        gain += remove(parent, other);
+        bool target_is_outside = true;  // of the moved subtree, into which an earlier move may have taken the target
+        for (std::uint32_t i = move.target; i != none && target_is_outside; i = nodes_[i].parent)
+            target_is_outside = i != move.node;
+        if (target_is_outside) {
+            gain -= insert(move.node, parent, move.target);
             if (gain > 0) return true;
-            take_out(parent, move.target);
+            remove(parent, move.target);
         }
-        put_in(move.node, parent, other);
+        insert(move.node, parent, other);
         return false;
     }
 
-    // Leaves `other` in its parent's place. Returns by how much the nodes above shrink.
-    float take_out(std::uint32_t parent, std::uint32_t other) {
+    // Removes `parent` and one of its children: `other`, its other child, takes its place. Returns by how much the
+    // nodes above shrink.
+    float remove(std::uint32_t parent, std::uint32_t other) {
         const std::uint32_t above = nodes_[parent].parent;
-        auto& child = nodes_[above].child;
-        child[child[1] == parent] = other;
+        nodes_[above].replace_child(parent, other);
         nodes_[other].parent = above;
         float shrunk = 0;
         for (std::uint32_t i = above; i != none; i = nodes_[i].parent) {
             LinkedNode& at = nodes_[i];
             const Box box = joined(nodes_[at.child[0]].box, nodes_[at.child[1]].box);
-            if (same(box, at.box)) break;
+            if (are_equal(box, at.box)) break;
             shrunk += at.box.half_area() - box.half_area();
             at.box = box;
         }
         return shrunk;
     }
 
-    // Has `parent` join the node and the target in the target's place. Returns by how much the tree grows.
-    float put_in(std::uint32_t node, std::uint32_t parent, std::uint32_t target) {
+    // Inserts `parent`, as the parent of `node` and `target`, in target's place. Returns by how much the tree grows.
+    float insert(std::uint32_t node, std::uint32_t parent, std::uint32_t target) {
         const std::uint32_t above = nodes_[target].parent;
-        auto& child = nodes_[above].child;
-        child[child[1] == target] = parent;
+        nodes_[above].replace_child(target, parent);
         nodes_[parent].parent = above;
         nodes_[parent].child = {node, target};
         nodes_[node].parent = nodes_[target].parent = parent;
@@ -183,7 +194,7 @@ private:
         for (std::uint32_t i = above; i != none; i = nodes_[i].parent) {
             LinkedNode& at = nodes_[i];
             const Box box = joined(at.box, nodes_[node].box);
-            if (same(box, at.box)) break;
+            if (are_equal(box, at.box)) break;
             grown += box.half_area() - at.box.half_area();
             at.box = box;
         }
@@ -194,7 +205,7 @@ private:
     std::uint32_t used_ = 0, root_ = 0;
 };
 
-// Counts references; returns the depth.
+// Sets the counts of inner nodes. Returns the tree's depth.
 int count_refs(LinkedTree& linked) {
     struct Entry {
         std::uint32_t node;
@@ -215,18 +226,18 @@ int count_refs(LinkedTree& linked) {
     return depth;
 }
 
-// Writes references and nodes back in the tree's own form.
-class Unlinker {
+// Writes a linked tree's references and nodes to a BinaryTree.
+class BinaryTreeWriter {
 public:
-    Unlinker(const LinkedTree& linked, BinaryTree& tree) : linked_(linked), tree_(tree), refs_(tree.count) {}
+    BinaryTreeWriter(const LinkedTree& linked, BinaryTree& tree) : linked_(linked), tree_(tree), refs_(tree.count) {}
 
     void write() {
-        unlink(linked_.root(), tree_.root());
+        write_subtree(linked_.root(), tree_.root());
         tree_.refs = std::move(refs_);
     }
 
 private:
-    SlotCosts unlink(std::uint32_t index, const Subtree& top) {
+    SlotCosts write_subtree(std::uint32_t index, const Subtree& top) {
         const LinkedNode& node = linked_[index];
         if (!top.has_node()) {
             std::uint32_t place = top.begin;
@@ -242,14 +253,15 @@ private:
             if (std::abs(apart[k]) > std::abs(apart[axis])) axis = k;
         if (apart[axis] < 0) std::swap(left, right);
         const std::uint32_t split = top.begin + linked_[left].count;
-        const SlotCosts left_costs = unlink(left, top.left(split)), right_costs = unlink(right, top.right(split));
+        const SlotCosts left_costs = write_subtree(left, top.left(split)),
+                        right_costs = write_subtree(right, top.right(split));
         return store_node(tree_, top, node.box, split, axis, left_costs, right_costs);
     }
 
     void write_block(std::uint32_t index, std::uint32_t& place) {
         const LinkedNode& node = linked_[index];
         if (node.is_leaf()) {
-            for (std::uint32_t i = 0; i < node.count; ++i) refs_[place++] = tree_.refs[node.child[1] + i];
+            for (std::uint32_t i = 0; i < node.count; ++i) refs_[place++] = tree_.refs[node.first_ref() + i];
             return;
         }
         for (const std::uint32_t child : node.child) write_block(child, place);
@@ -266,8 +278,8 @@ bool optimize_by_reinsertion(BinaryTree& tree, Threads& threads) {
     if (tree.count <= block_width) return true;
     LinkedTree linked(tree);
     linked.optimize(threads);
-    if (count_refs(linked) > deepest) return false;
-    Unlinker(linked, tree).write();
+    if (count_refs(linked) > max_recursion) return false;
+    BinaryTreeWriter(linked, tree).write();
     return true;
 }
 

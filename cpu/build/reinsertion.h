@@ -1,4 +1,4 @@
-// Better trees for more time: subtrees are taken out of the binary tree and put back where they enlarge it least.
+// Optimisation of the binary tree by reinsertion: subtrees are removed and inserted again where they enlarge it least.
 #pragma once
 
 #include "build/binary_tree.h"
@@ -6,10 +6,10 @@
 
 namespace wive {
 
-// The same references under a tree of lower surface area: every subtree looks for a better place (branch and bound, all
-// threads; Meister, Bittner 2018, "Parallel Reinsertion for Bounding Volume Hierarchy Optimization"), then those that
-// found one move, largest gain first, each only if it still gains. Deterministic on any number of threads. False, and
-// the tree is as it was, where the better one would be too deep to be walked by recursion.
+// Lowers the surface area of a tree over the same references (Meister, Bittner 2018, "Parallel Reinsertion for Bounding
+// Volume Hierarchy Optimization"). In each round all threads search a better place for every subtree by branch and
+// bound; then subtrees move, largest gain first, each only if it still gains. The same tree on any number of threads.
+// Returns false, and leaves the tree as it was, if the optimised one would be too deep for recursion.
 bool optimize_by_reinsertion(BinaryTree& tree, Threads& threads);
 
 }  // namespace wive
