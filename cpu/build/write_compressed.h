@@ -1,4 +1,4 @@
-// Writing compressed nodes and blocks.
+// Writes compressed nodes and blocks.
 #pragma once
 
 #include <cstddef>
@@ -17,10 +17,12 @@ struct CompressedWriter {
     using Node = CompressedNode;
     using Block = CompressedBlock;
 
-    // Every box of `out` holds that of `node`, in exact arithmetic. children: how many lanes are used.
+    // Every box of `out` contains that of `node`, in exact arithmetic. children: the number of lanes used.
     static void write_node(const wive::Node& node, int children, Node& out);
+    // The size of a leaf over these prims, at most max_compressed_leaf of them.
     static LeafSize leaf_size(const Mesh<float>& mesh, std::span<const std::uint32_t> prims);
-    // The same for both accuracies.
+    // Writes the leaf and returns its size. The bytes do not depend on the accuracy: blocks hold vertices for all
+    // three.
     static LeafSize write_leaf(const Mesh<float>& mesh, Accuracy, std::span<const std::uint32_t> prims, std::byte* out);
 };
 

@@ -1,4 +1,4 @@
-// Writing uncompressed nodes and blocks, and blocks of doubles, which are never compressed.
+// Writes uncompressed nodes and blocks. Blocks of doubles are never compressed.
 #pragma once
 
 #include <cstddef>

@@ -1,8 +1,10 @@
-// How boxes and triangles are stored in a tree: used when it is built and when it is refitted.
+// Writes boxes and triangles to uncompressed nodes and blocks, for building and refitting.
 #pragma once
 
 #include <algorithm>
 #include <array>
+#include <cassert>
+#include <cmath>
 #include <cstddef>
 #include <cstring>
 #include <limits>
@@ -14,24 +16,29 @@
 
 namespace wive {
 
-// Larger than any plane with its slack, small enough that no arithmetic on it overflows.
+// A plane of an empty lane: larger than any box's plane with its slack, small enough that no arithmetic on it
+// overflows.
 inline constexpr float empty_plane = 1e24f;
 
-// A child's box; an empty one becomes a box that nothing hits.
+// Writes a child's box. An empty one becomes the inverted box that nothing hits.
 inline void write_box(Node& node, int lane, const Box& box, const std::array<float, 3>& center) {
     const bool empty = !(box.lo[0] <= box.hi[0]);
     for (int axis = 0; axis < 3; ++axis) {
         const float c = center[static_cast<std::size_t>(axis)];
-        node.planes[2 * axis][lane] = empty ? empty_plane : plane_below(box.lo[axis], c);
-        node.planes[2 * axis + 1][lane] = empty ? -empty_plane : plane_above(box.hi[axis], c);
+        const float low = empty ? empty_plane : plane_below(box.lo[axis], c);
+        const float high = empty ? -empty_plane : plane_above(box.hi[axis], c);
+        assert(std::isfinite(low) && std::isfinite(high));  // check_mesh refuses coordinates beyond max_coordinate
+        node.planes[low_row(axis)][lane] = low;
+        node.planes[high_row(axis)][lane] = high;
     }
 }
 
-// Bytes behind a block's last row.
+// Bytes of a block behind its prims.
 template <class Real>
 inline constexpr std::size_t block_padding =
     sizeof(TriangleBlockOf<Real>) - sizeof TriangleBlockOf<Real>::rows - sizeof TriangleBlockOf<Real>::prim;
 
+// Makes all lanes unused.
 template <class Real>
 void clear_block(TriangleBlockOf<Real>& block) {
     for (auto& row : block.rows) std::fill(std::begin(row), std::end(row), std::numeric_limits<Real>::quiet_NaN());
@@ -48,7 +55,7 @@ void write_triangle(TriangleBlockOf<Real>& block, std::uint32_t lane, const Mesh
         const Real* corner = mesh.corner(prim, k);
         const bool edge = accuracy == Accuracy::fast && k > 0;
         for (int axis = 0; axis < 3; ++axis)
-            block.rows[3 * k + axis][lane] = edge ? corner[axis] - first[axis] : corner[axis];
+            block.rows[triangle_row(k, axis)][lane] = edge ? corner[axis] - first[axis] : corner[axis];
     }
     block.prim[lane] = static_cast<std::int32_t>(prim);
 }
