@@ -1,5 +1,5 @@
-// Exact sums of doubles (Shewchuk 1997, "Adaptive Precision Floating-Point Arithmetic"): for decisions that
-// rounding must not make. Slow, and only reached when a cheap filter is in doubt.
+// Exact signs of sums of doubles (Shewchuk 1997, "Adaptive Precision Floating-Point Arithmetic"). Slow: called only if
+// a cheap filter is in doubt.
 #pragma once
 
 #include <array>
@@ -30,12 +30,12 @@ int sign_of_sum(const std::array<double, count>& terms) {
     return (largest > 0) - (largest < 0);
 }
 
-// The exact sign of the area of (a, b, c) in the plane. A product of two floats is exact in double;
-// one of doubles is the sum of two, unless it underflows: coordinates are zero or above 1e-130.
+// The exact sign of the area of (a, b, c) in the plane. A product of two floats is exact in double. A product of
+// doubles is the sum of two doubles unless it underflows: coordinates must be zero or above 1e-130.
 inline int orientation(const double a[2], const double b[2], const double c[2]) {
     std::array<double, 12> terms{};
     std::size_t count = 0;
-    const auto add_product = [&](double x, double y) {  // and what rounding it takes off
+    const auto add_product = [&](double x, double y) {  // the rounded product and its rounding error
         terms[count] = x * y;
         terms[count + 1] = rounded_off_product(x, y, terms[count]);
         count += 2;

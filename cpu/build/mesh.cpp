@@ -14,13 +14,15 @@
 #include "core/layout.h"
 #include "core/parallel.h"
 #include "core/planes.h"
+#include "core/vec3.h"
 
 namespace wive {
 namespace {
 
 constexpr std::size_t chunk_size = 1 << 14;
 
-// The lowest index in [0, count) for which is_bad holds, or count. Chunks are asked as a whole first, by has_bad.
+// The lowest index in [0, count) for which is_bad holds, or count. has_bad(begin, end), which is faster per index,
+// tells if a chunk has any.
 template <class HasBad, class IsBad>
 std::size_t first_bad(std::size_t count, Threads& threads, const HasBad& has_bad, const IsBad& is_bad) {
     std::atomic<std::size_t> first{count};
@@ -37,7 +39,8 @@ std::size_t first_bad(std::size_t count, Threads& threads, const HasBad& has_bad
     return first.load();
 }
 
-// Whether the three corners don't lie on one line, decided exactly: they do where all three projections have area zero.
+// Whether a triangle has an area, decided exactly. It has none if and only if its projections onto the three coordinate
+// planes have none.
 template <class Real>
 bool has_area(const Real* a, const Real* b, const Real* c) {
     for (int k = 0; k < 3; ++k) {
@@ -56,9 +59,9 @@ float projected_area(Float4v a, Float4v b, Float4v c) {
     return areas[0] + areas[1] + areas[2];
 }
 
-// Settles it for most: some component of the cross product is larger than its rounding error. Differences and products
-// are off by a unit roundoff u each, sums of two by another: 4u of both products' sizes, taken twice as large, and what
-// underflow may add.
+// A filter before has_area, which it spares most triangles: true if some component of the cross product is larger than
+// its rounding error. Differences, products and their sum are each off by a unit roundoff u, which makes 4u of both
+// products' sizes. The bound is twice as large, plus the error of underflow.
 bool surely_has_area(Float4v a, Float4v b, Float4v c) {
     constexpr float error = 4 * std::numeric_limits<float>::epsilon(),
                     underflow = 4 * std::numeric_limits<float>::min();
@@ -83,15 +86,11 @@ bool surely_has_area(const double* a, const double* b, const double* c) {
 }
 
 float projected_area(const double* a, const double* b, const double* c) {
-    double sum = 0;
-    for (int k = 0; k < 3; ++k) {
-        const int i = (k + 1) % 3, j = (k + 2) % 3;
-        sum += std::abs((b[i] - a[i]) * (c[j] - a[j]) - (b[j] - a[j]) * (c[i] - a[i]));
-    }
-    return static_cast<float>(sum);
+    const auto [x, y, z] = triangle_normal(a, b, c);
+    return static_cast<float>(std::abs(x) + std::abs(y) + std::abs(z));
 }
 
-// A vertex, with a zero in the fourth lane.
+// A vertex, with zero in lane 3. Reads four floats, except for the last vertex, behind which there may be no memory.
 Float4v load_vertex(const Mesh<float>& mesh, std::int32_t index) {
     const float* v = mesh.vertices + 3 * static_cast<std::size_t>(index);
     if (static_cast<std::size_t>(index) + 1 == mesh.vertex_count) return Float4v{v[0], v[1], v[2], 0};
@@ -107,8 +106,8 @@ template <class Real>
 void check_mesh(const Mesh<Real>& mesh, Threads& threads) {
     if (mesh.vertex_count > std::numeric_limits<std::int32_t>::max())
         throw std::invalid_argument("vertices: expected at most 2147483647, split the mesh into several scenes");
-    // Without a branch, so that compilers take several at a time. Bits of magnitudes compare as the magnitudes do,
-    // those of infinities and NaNs above all others.
+    // Branch-free, so that the compiler vectorises it. The bits of magnitudes compare as the magnitudes do; those of
+    // infinities and NaNs are above all others.
     const auto bad_vertices = [&](std::size_t begin, std::size_t end) {
         using Bits = std::conditional_t<sizeof(Real) == sizeof(float), std::int32_t, std::int64_t>;
         constexpr Bits largest = std::bit_cast<Bits>(max_coordinate<Real>),
@@ -218,7 +217,8 @@ PrimRefs make_prim_refs(const Mesh<Real>& mesh, const Point& center, Threads& th
         part.count = static_cast<std::size_t>(to - (all.refs.data() + begin));
         parts[begin / chunk_size] = part;
     });
-    std::size_t count = 0;  // close the gaps that left-out triangles made; usually there is none and nothing moves
+    // Close the gaps of triangles without area. Usually there is none and nothing moves.
+    std::size_t count = 0;
     for (std::size_t i = 0; i < chunks; ++i) {
         const PrimRef* from = all.refs.data() + i * chunk_size;
         if (count != i * chunk_size) std::copy(from, from + parts[i].count, all.refs.data() + count);

@@ -1,8 +1,9 @@
-// The caller's triangles: checked once, then boxed for the builder.
+// The caller's triangles, their checks, and the boxes that the builder makes of them.
 #pragma once
 
 #include <array>
 #include <bit>
+#include <cassert>
 #include <cstddef>
 #include <cstdint>
 
@@ -19,13 +20,16 @@ struct Mesh {
     const std::int32_t* faces;  // (face_count, 3)
     std::size_t face_count;
 
+    // Valid for the faces of a mesh that check_mesh has accepted.
     const Real* corner(std::size_t face, int k) const {
-        return vertices + 3 * static_cast<std::size_t>(faces[3 * face + static_cast<std::size_t>(k)]);
+        assert(face < face_count && k >= 0 && k < 3);
+        const auto vertex = static_cast<std::size_t>(faces[3 * face + static_cast<std::size_t>(k)]);
+        assert(vertex < vertex_count);
+        return vertices + 3 * vertex;
     }
 };
 
-// A triangle's box, number and size, 32 bytes: the number rides in the low corner's fourth lane, the projected area in
-// the high one's.
+// A triangle's box, prim and projected area in 32 bytes. Lane 3 of lo holds the prim, lane 3 of hi the projected area.
 struct PrimRef {
     Float4v lo, hi;
 
@@ -33,39 +37,39 @@ struct PrimRef {
     // Twice the sum of the triangle's projections onto the three planes between axes.
     float projected_area() const { return hi[3]; }
     Box box() const { return {lo, hi}; }
-    // Twice the box's centre. The number's bits are cleared first: as a float they would be a slow denormal.
+    // Twice the box's centre. The prim's bits are cleared first: as a float they would be a denormal, which is slow.
     Float4v centroid() const {
         const Int4v xyz = {-1, -1, -1, 0};
         return std::bit_cast<Float4v>(std::bit_cast<Int4v>(lo) & xyz) + hi;
     }
 };
 
-// Throws std::invalid_argument naming the first vertex that is not a usable number, or the first face that
-// points outside the vertices.
+// Throws std::invalid_argument that names the first vertex that is not finite or beyond max_coordinate, or the first
+// face with an index outside the vertices.
 template <class Real>
 void check_mesh(const Mesh<Real>& mesh, Threads& threads);
 
 using Point = std::array<float, 3>;
 
-// The box of a triangle, its projected area in the high corner's fourth lane; false where it has no area, decided
-// exactly. In float32, boxes are in the mesh's coordinates whatever the tree's centre, and nodes store them relative to
-// it later; in float64 they are relative to it from here on.
+// Sets `box` to a triangle's box, with the projected area in lane 3 of hi. Returns false if the triangle has no area,
+// decided exactly. float32: the box is in the mesh's coordinates, and only planes are relative to the tree's centre.
+// float64: the box itself is relative to the centre.
 bool box_triangle(const Mesh<float>& mesh, const Point& center, std::size_t face, Box& box);
 bool box_triangle(const Mesh<double>& mesh, const Point& center, std::size_t face, Box& box);
 
-// The lowest and the highest corner; infinity and minus infinity without any triangle.
+// The lowest and the highest corner of a box; infinity and -infinity if it is empty.
 using Bounds = std::array<std::array<double, 3>, 2>;
 
-// Of the triangles with an area.
+// The bounds of the triangles with an area.
 Bounds find_bounds(const Mesh<double>& mesh, Threads& threads);
 
 struct PrimRefs {
     LargeArray<PrimRef> refs;
     std::uint32_t count = 0;
-    Box box, centroids;  // round all of them
+    Box box, centroids;  // around all references' boxes, and around their centroids
 };
 
-// One reference for each triangle with an area; zero-area triangles can't be hit and are left out.
+// One reference per triangle with an area. The others can't be hit.
 template <class Real>
 PrimRefs make_prim_refs(const Mesh<Real>& mesh, const Point& center, Threads& threads);
 
