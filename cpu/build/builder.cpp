@@ -9,17 +9,21 @@
 #include "build/emit.h"
 #include "build/reinsertion.h"
 #include "build/write_node.h"
+#include "core/ensure.h"
 #include "core/parallel.h"
 
 namespace wive {
 
 namespace {
 
-// In blocks of four triangles.
+// The largest leaf in blocks of four triangles. A compressed block may hold only two (see max_compressed_leaf).
 constexpr std::uint32_t largest_leaf(Precision precision, NodeForm form) {
-    const bool shared = precision == Precision::float32 && form == NodeForm::compressed;
-    return shared ? max_compressed_leaf / block_width : max_leaf_blocks;
+    const bool compressed_blocks = precision == Precision::float32 && form == NodeForm::compressed;
+    return compressed_blocks ? max_compressed_leaf / block_width : max_leaf_blocks;
 }
+
+// The centre is moved from the origin only if that is more than this many half extents away from the mesh.
+constexpr double far_from_origin = 4;
 
 }  // namespace
 
@@ -34,19 +38,20 @@ Bvh::Bvh(const Mesh<Real>& mesh, const BuildOptions& options)
             "accuracy: 'exact' takes vertices in float32, got float64; round them, or use 'watertight'");
     check_mesh(mesh, threads);
     if constexpr (doubles) set_bounds(find_bounds(mesh, threads));
-    const auto plant = [&] {
+    const auto build_binary = [&] {
         return build_binary_tree(make_prim_refs(mesh, center_, threads), threads, options.depth_limit,
                                  largest_leaf(precision_, form_));
     };
-    BinaryTree tree = plant();
+    BinaryTree tree = build_binary();
     if (options.quality == Quality::high) optimize_by_reinsertion(tree, threads);
     triangle_count_ = tree.count;
-    const Point still_to_center = settle(tree.box);
-    EmittedTree emitted = emit_tree(tree, mesh, options, still_to_center, threads);
-    if (emitted.depth > options.depth_limit) {  // reinsertion knows no limit, binning does
-        tree = plant();
-        emitted = emit_tree(tree, mesh, options, still_to_center, threads);
+    const Point remaining_center = finish_bounds(tree.box);
+    EmittedTree emitted = emit_tree(tree, mesh, options, remaining_center, threads);
+    if (emitted.depth > options.depth_limit) {  // reinsertion has no depth limit, binning has
+        tree = build_binary();
+        emitted = emit_tree(tree, mesh, options, remaining_center, threads);
     }
+    ensure(emitted.depth <= max_depth, "a tree of at most max_depth levels");
     units_ = std::move(emitted.units);
     node_count_ = emitted.node_count;
     depth_ = emitted.depth;
@@ -55,33 +60,31 @@ Bvh::Bvh(const Mesh<Real>& mesh, const BuildOptions& options)
 template Bvh::Bvh(const Mesh<float>&, const BuildOptions&);
 template Bvh::Bvh(const Mesh<double>&, const BuildOptions&);
 
-// Far from the origin, planes relative to the middle keep the boxes' slack small. Near it, they are left as they are,
-// and so stay exact.
+// For a mesh far from the origin, planes relative to its middle keep the boxes' slack small. Near the origin the centre
+// is zero, and planes stay exact.
 void Bvh::set_bounds(const Bounds& bounds) {
     bounds_ = bounds;
     const auto& [low, high] = bounds_;
     if (!(low[0] <= high[0])) return;
-    const double size = 0.5 * std::max({high[0] - low[0], high[1] - low[1], high[2] - low[2]});
+    const double half_size = 0.5 * std::max({high[0] - low[0], high[1] - low[1], high[2] - low[2]});
     for (std::size_t axis = 0; axis < 3; ++axis) {
         const double middle = 0.5 * low[axis] + 0.5 * high[axis];
-        center_[axis] = std::abs(middle) > 4 * size ? static_cast<float>(middle) : 0.0f;
+        center_[axis] = std::abs(middle) > far_from_origin * half_size ? static_cast<float>(middle) : 0.0f;
     }
 }
 
-// What follows from the box of all triangles. Float32 trees learn their bounds from it; float64 trees had to know them
-// before, and their boxes are relative to the centre already. Returns what boxes are still to be taken relative to.
-Point Bvh::settle(const Box& all) {
-    Point still_to_center{};
+Point Bvh::finish_bounds(const Box& all) {
+    Point remaining_center{};
     if (precision_ == Precision::float32) {
         set_bounds({{{all.lo[0], all.lo[1], all.lo[2]}, {all.hi[0], all.hi[1], all.hi[2]}}});
-        still_to_center = center_;
+        remaining_center = center_;
     }
     if (all.lo[0] <= all.hi[0])
         for (std::size_t axis = 0; axis < 3; ++axis) {
-            const float center = still_to_center[axis];
+            const float center = remaining_center[axis];
             extent_[axis] = std::max(plane_above(all.hi[axis], center), -plane_below(all.lo[axis], center));
         }
-    return still_to_center;
+    return remaining_center;
 }
 
 BvhView Bvh::view() const {
@@ -92,7 +95,8 @@ template <class StoredNode>
 Bvh::Sah Bvh::sah_of(double root) const {
     const auto half_area = [](const StoredNode& node, int lane) {
         double d[3];
-        for (int axis = 0; axis < 3; ++axis) d[axis] = node.plane(2 * axis + 1, lane) - node.plane(2 * axis, lane);
+        for (int axis = 0; axis < 3; ++axis)
+            d[axis] = node.plane(high_row(axis), lane) - node.plane(low_row(axis), lane);
         return d[0] < 0 ? 0.0 : d[0] * d[1] + d[1] * d[2] + d[2] * d[0];
     };
     Sah sah = {1, 0};

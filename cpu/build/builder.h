@@ -1,4 +1,4 @@
-// From triangles to the tree that every backend traverses.
+// Builds the tree that every backend traverses from a mesh.
 #pragma once
 
 #include <array>
@@ -15,33 +15,33 @@
 
 namespace wive {
 
-// medium: binned SAH. high: the same tree optimised further, for several times the build time.
+// medium: binned SAH. high: that tree, optimised by reinsertion for several times the build time.
 enum class Quality { medium, high };
 
 struct BuildOptions {
     Accuracy accuracy = Accuracy::watertight;
     NodeForm nodes = NodeForm::float32;
     ChildOrder order = ChildOrder::treelet;
-    unsigned threads = 0;  // 0: every core
+    unsigned threads = 0;  // 0: one per core
     int depth_limit = max_depth;
     Quality quality = Quality::medium;
 };
 
 class Bvh {
 public:
-    // Throws std::invalid_argument on a mesh that check_mesh refuses. The same tree whatever the threads.
+    // Throws std::invalid_argument for a mesh that check_mesh refuses. The same tree on any number of threads.
     template <class Real>
     Bvh(const Mesh<Real>& mesh, const BuildOptions& options);
 
-    // The same tree over moved vertices; null where a triangle that had no area, and so no leaf, now has one, and for
-    // compressed trees, whose leaves may need other sizes. Throws as building does.
-    // Real is that of the mesh it was built from.
+    // Refits to moved vertices: new boxes and triangles, the same children and orders. Returns null if refitting is
+    // impossible: a formerly degenerate triangle (in no leaf) gained area, or the tree is compressed (leaf sizes depend
+    // on vertices). Throws as the constructor does. Real must be that of the mesh the tree was built from.
     template <class Real>
     std::unique_ptr<Bvh> refitted(const Mesh<Real>& mesh, unsigned threads) const;
 
     BvhView view() const;
     std::size_t bytes() const { return units_.size(); }
-    // As they are stored; float32 blocks have one size, compressed ones two.
+    // The stored bytes of all nodes and of all blocks. Compressed blocks have two sizes (see CompressedBlock).
     std::span<const std::byte> nodes() const { return {units_.data(), node_count_ * node_bytes()}; }
     std::span<const std::byte> blocks() const { return {units_.data() + nodes().size(), bytes() - nodes().size()}; }
     std::size_t node_bytes() const { return form_ == NodeForm::float32 ? sizeof(Node) : sizeof(CompressedNode); }
@@ -54,13 +54,16 @@ public:
     struct Sah {
         double nodes, blocks;
     };
-    // Surface-area cost relative to the root: node visits and triangle block tests of a ray through the root's box.
+    // Surface area cost: the expected node visits and triangle block tests of a ray through the root's box.
     Sah sah() const;
 
 private:
     Bvh() = default;
+    // Sets the bounds and the centre that follows from them.
     void set_bounds(const Bounds& bounds);
-    Point settle(const Box& all);
+    // Sets bounds (float32) and extent from the box of all triangles. Returns the point that planes are still to be
+    // made relative to: the centre, or zero for float64, whose boxes are relative to the centre from box_triangle on.
+    Point finish_bounds(const Box& all);
     template <class StoredNode>
     Sah sah_of(double root) const;
 

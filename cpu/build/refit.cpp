@@ -1,4 +1,4 @@
-// The same tree over moved vertices: boxes and triangles from the leaves up, children and orders as they were.
+// Refit to moved vertices: new triangles and boxes from the leaves up, the same children and orders.
 #include <algorithm>
 #include <atomic>
 #include <cstring>
@@ -8,28 +8,32 @@
 #include "build/builder.h"
 #include "build/write_node.h"
 #include "core/parallel.h"
-#include "traverse/slabs.h"
 
 namespace wive {
 namespace {
 
-constexpr std::size_t task_count = 256;  // subtrees to hand out, whatever the threads
+constexpr std::size_t task_count = 256;  // about as many subtrees are fitted in parallel
 constexpr std::size_t chunk_size = 1 << 12;
 
-// Boxes of every lane as box_triangle has them; how nodes store them comes after.
+// Writes the leaves and computes the box of every lane, in the coordinates of box_triangle. Bvh::refitted then writes
+// the planes, once the centre is known.
 template <class Real>
 class BoxFitter {
-    using Block = TriangleBlockOf<Real>;
-    using Form = Float32Form<Real>;
+    // What BvhView needs to know of a tree's form. Only uncompressed trees are refitted.
+    struct Form {
+        using Node = wive::Node;
+        using Block = TriangleBlockOf<Real>;
+    };
+    using Block = typename Form::Block;
 
 public:
     BoxFitter(const BvhView& from, std::size_t node_count, std::byte* to, const Mesh<Real>& mesh, const Point& center,
               Accuracy accuracy)
         : from_(from), to_(to), mesh_(mesh), center_(center), accuracy_(accuracy), boxes_(node_width * node_count) {}
 
-    // Also writes the leaves.
+    // Computes all boxes and writes all leaves.
     void fit(Threads& threads) {
-        std::vector<std::uint32_t> nodes = {inner_child(0)};  // breadth first; those before `top` wait for the others
+        std::vector<std::uint32_t> nodes = {inner_child(0)};  // breadth first; those before `top` are fitted last
         std::size_t top = 0;
         for (; top < nodes.size() && nodes.size() - top < task_count; ++top)
             for (const std::uint32_t child : from_.template node<Form>(nodes[top]).child)
@@ -46,7 +50,7 @@ public:
     std::size_t triangle_count() const { return triangle_count_; }
 
 private:
-    static constexpr std::uint32_t unused = inner_child(0);  // the root is no one's child
+    static constexpr std::uint32_t unused = inner_child(0);  // the root is no node's child
 
     static std::size_t index_of(std::uint32_t child) { return child_offset(child) / sizeof(Node); }
 
@@ -74,7 +78,7 @@ private:
         return box_of(node);
     }
 
-    // Triangles that have lost their area leave the leaf.
+    // Writes a leaf without the triangles that lost their area. Returns its box.
     Box fit_leaf(std::uint32_t leaf, std::size_t& count) {
         const Block* old = from_.template leaf<Form>(leaf);
         Block* block = reinterpret_cast<Block*>(to_ + child_offset(leaf));
@@ -112,7 +116,7 @@ std::span<const TriangleBlockOf<Real>> blocks_of(const Bvh& bvh) {
 
 // Whether a triangle that is in no leaf has an area.
 template <class Real>
-bool is_one_missing(std::span<const TriangleBlockOf<Real>> blocks, const Mesh<Real>& mesh, Threads& threads) {
+bool is_any_missing(std::span<const TriangleBlockOf<Real>> blocks, const Mesh<Real>& mesh, Threads& threads) {
     std::vector<char> present(mesh.face_count);
     for (const auto& block : blocks)
         for (const std::int32_t prim : block.prim)
@@ -129,11 +133,11 @@ bool is_one_missing(std::span<const TriangleBlockOf<Real>> blocks, const Mesh<Re
 }  // namespace
 
 template <class Real>
-std::unique_ptr<Bvh> Bvh::refitted(const Mesh<Real>& mesh, unsigned asked_threads) const {
+std::unique_ptr<Bvh> Bvh::refitted(const Mesh<Real>& mesh, unsigned requested_threads) const {
     if (form_ != NodeForm::float32) return nullptr;
-    Threads threads(thread_count(asked_threads));
+    Threads threads(thread_count(requested_threads));
     check_mesh(mesh, threads);
-    if (triangle_count_ < mesh.face_count && is_one_missing(blocks_of<Real>(*this), mesh, threads)) return nullptr;
+    if (triangle_count_ < mesh.face_count && is_any_missing(blocks_of<Real>(*this), mesh, threads)) return nullptr;
     std::unique_ptr<Bvh> bvh(new Bvh);
     bvh->units_ = LargeArray<std::byte>(units_.size());
     bvh->node_count_ = node_count_;
@@ -145,14 +149,14 @@ std::unique_ptr<Bvh> Bvh::refitted(const Mesh<Real>& mesh, unsigned asked_thread
     BoxFitter<Real> fitter(from, node_count_, bvh->units_.data(), mesh, bvh->center_, accuracy_);
     fitter.fit(threads);
     bvh->triangle_count_ = fitter.triangle_count();
-    const Point still_to_center = bvh->settle(fitter.all());
+    const Point remaining_center = bvh->finish_bounds(fitter.all());
     const Node* old_nodes = reinterpret_cast<const Node*>(units_.data());
     Node* to = reinterpret_cast<Node*>(bvh->units_.data());
     parallel_chunks(node_count_, chunk_size, threads, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) {
             const Node& old = old_nodes[i];
             for (int lane = 0; lane < node_width; ++lane)
-                write_box(to[i], lane, fitter.boxes(i)[lane], still_to_center);
+                write_box(to[i], lane, fitter.boxes(i)[lane], remaining_center);
             std::memcpy(to[i].child, old.child, sizeof old.child);
             std::memcpy(to[i].order, old.order, sizeof old.order);
         }
