@@ -1,4 +1,4 @@
-// The Python face of the core: the tree and the renderer.
+// The Python module: the tree and the renderer.
 #include <optional>
 #include <span>
 
@@ -58,7 +58,7 @@ std::unique_ptr<PyBvh> build(Array<Real> vertices, Array<std::int32_t> faces, co
     return std::make_unique<PyBvh>(std::move(vertices), std::move(faces), options);
 }
 
-// Function and context as ctypes gives their addresses.
+// addresses: of function and context, as ctypes has them.
 ForeignTracer foreign_tracer(const std::optional<std::pair<std::uintptr_t, std::uintptr_t>>& addresses) {
     if (!addresses) return {};
     return {reinterpret_cast<ForeignTracer::Function>(addresses->first),
@@ -106,12 +106,14 @@ py::array_t<T> view(py::handle owner, std::vector<py::ssize_t> shape, const T* d
     return array;
 }
 
-// Nodes or blocks as words, in rows of so many.
-py::array_t<std::uint32_t> rows(py::handle owner, std::span<const std::byte> data, std::size_t each,
-                                std::size_t columns) {
+constexpr std::size_t word_bytes = sizeof(std::uint32_t), unit_words = unit_bytes / word_bytes;
+
+// Nodes or blocks of item_bytes each, as a (n, rows, columns) array of words.
+py::array_t<std::uint32_t> words(py::handle owner, std::span<const std::byte> data, std::size_t item_bytes,
+                                 std::size_t columns) {
     return view(owner,
-                {static_cast<py::ssize_t>(data.size() / each), static_cast<py::ssize_t>(each / 4 / columns),
-                 static_cast<py::ssize_t>(columns)},
+                {static_cast<py::ssize_t>(data.size() / item_bytes),
+                 static_cast<py::ssize_t>(item_bytes / word_bytes / columns), static_cast<py::ssize_t>(columns)},
                 reinterpret_cast<const std::uint32_t*>(data.data()));
 }
 
@@ -134,7 +136,7 @@ PYBIND11_MODULE(_cpu, m, pybind11::mod_gil_not_used()) {
         return names;
     });
     m.def("avx512_form", [] {
-        find_kernels<float>("avx512.full");  // throws where they can't run
+        find_kernels<float>("avx512.full");  // throws if they can't run
         return avx512_form();
     });
     PyBvhClass bvh(m, "Bvh");
@@ -156,23 +158,25 @@ PYBIND11_MODULE(_cpu, m, pybind11::mod_gil_not_used()) {
         .def_property_readonly("nodes",
                                [](py::object self) {
                                    const Bvh& bvh = self.cast<const PyBvh&>().bvh();
-                                   return rows(self, bvh.nodes(), bvh.node_bytes(), 8);
+                                   return words(self, bvh.nodes(), bvh.node_bytes(), node_width);
                                })
         .def_property_readonly("blocks",
                                [](py::object self) {
                                    const Bvh& bvh = self.cast<const PyBvh&>().bvh();
                                    if (bvh.precision() == Precision::float64)
-                                       return rows(self, bvh.blocks(), sizeof(TriangleBlockOf<double>), 4);
+                                       return words(self, bvh.blocks(), sizeof(TriangleBlockOf<double>), block_width);
                                    if (bvh.node_form() == NodeForm::compressed)
-                                       return rows(self, bvh.blocks(), unit_bytes, 8);
-                                   return rows(self, bvh.blocks(), sizeof(TriangleBlock), 4);
+                                       return words(self, bvh.blocks(), unit_bytes, unit_words);
+                                   return words(self, bvh.blocks(), sizeof(TriangleBlock), block_width);
                                })
-        .def_property_readonly("units",
-                               [](py::object self) {
-                                   const Bvh& bvh = self.cast<const PyBvh&>().bvh();
-                                   return view(self, {static_cast<py::ssize_t>(bvh.bytes() / unit_bytes), 8},
-                                               reinterpret_cast<const std::uint32_t*>(bvh.view().units));
-                               })
+        .def_property_readonly(
+            "units",
+            [](py::object self) {
+                const Bvh& bvh = self.cast<const PyBvh&>().bvh();
+                return view(self,
+                            {static_cast<py::ssize_t>(bvh.bytes() / unit_bytes), static_cast<py::ssize_t>(unit_words)},
+                            reinterpret_cast<const std::uint32_t*>(bvh.view().units));
+            })
         .def_property_readonly("center",
                                [](const PyBvh& self) {
                                    const BvhView v = self.bvh().view();

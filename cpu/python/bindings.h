@@ -1,5 +1,5 @@
-// What the files of bindings share: arguments are checked in Python (wive/scene.py); here only what memory safety
-// needs.
+// What the binding files share. Arguments are checked in Python (wive/_internal/arguments.py); the bindings check only
+// what memory safety needs.
 #pragma once
 
 #include <pybind11/numpy.h>
@@ -21,7 +21,7 @@ namespace py = pybind11;
 template <class T>
 using Array = py::array_t<T, py::array::c_style>;
 
-// An argument that must have the dtype and the layout already.
+// An array argument that is not converted: it must have the dtype and the layout.
 inline py::arg array_arg(const char* name) { return py::arg(name).noconvert(); }
 
 inline void expect(bool condition, const char* message) {
@@ -33,7 +33,7 @@ void expect_shape(const Array<T>& array, py::ssize_t columns, const char* messag
     expect(array.ndim() == 2 && array.shape(1) == columns, message);
 }
 
-// The tree together with the arrays it was built from, which rendering reads.
+// A tree together with the arrays it was built from, which rendering reads.
 class PyBvh {
 public:
     template <class Real>
@@ -47,7 +47,7 @@ public:
         bvh_ = std::make_unique<Bvh>(view, options_);
     }
 
-    // The same faces over moved vertices. Where the tree can't be kept it is built anew.
+    // The tree of `other` over moved vertices: refitted, or built anew if it can't be.
     template <class Real>
     PyBvh(const PyBvh& other, Array<Real> vertices, unsigned threads)
         : vertices_(std::move(vertices)), faces_(other.faces_), options_(other.options_) {
@@ -68,7 +68,7 @@ public:
         return {vertices.data(), static_cast<std::size_t>(vertices.shape(0)), faces_.data(),
                 static_cast<std::size_t>(faces_.shape(0))};
     }
-    // That arrays of Real are what this tree takes.
+    // Throws unless the tree was built from vertices of Real.
     template <class Real>
     void expect_precision() const {
         expect(std::holds_alternative<Array<Real>>(vertices_),
@@ -84,7 +84,7 @@ private:
     std::unique_ptr<Bvh> bvh_;
 };
 
-// Defines the same for either precision: define(Real{}). Python picks by dtype, and float32 is asked first.
+// Calls define(float{}), then define(double{}). Python picks the overload by dtype and tries float32 first.
 template <class Define>
 void for_each_precision(const Define& define) {
     define(float{});
@@ -93,7 +93,7 @@ void for_each_precision(const Define& define) {
 
 using PyBvhClass = py::class_<PyBvh>;
 
-// Queries of rays, in bindings_queries.cpp; points and normals of hits, in bindings_surface.cpp.
+// Defined in bindings_queries.cpp: ray queries. In bindings_surface.cpp: points and normals of hits.
 void bind_queries(PyBvhClass& bvh);
 void bind_surface(py::module_& m);
 

@@ -13,24 +13,28 @@ namespace wive {
 namespace {
 
 constexpr float gray_albedo = 0.6f;
-constexpr int tile_width = 32;
-constexpr std::size_t wave_size = 4096;  // paths traced together by one thread
+constexpr int tile_width = 32;           // pixels of a row that one thread renders
+constexpr std::size_t wave_size = 4096;  // about as many paths are in a wavefront
+// Lifts a bounce's origin off its surface, as a multiple of the largest coordinate: 64 times the unit roundoff, well
+// above the rounding error of the point.
+constexpr float surface_offset = 0x1p-18f;
 
 struct Path {
     Vec3 throughput;
-    std::uint32_t pixel;  // within the tile's row
+    std::uint32_t pixel;  // counted from the tile's first
     std::uint32_t sample;
 };
 
-// Sine and cosine on [-pi/4, pi/4] to float's precision by their Taylor series: the same operations, and so the
-// same bits, wherever they run.
+// Sine and cosine on [-pi/4, pi/4] to float's precision, by their Taylor series: the same operations, and so the same
+// bits, on every backend.
 void sine_cosine(float x, float& sine, float& cosine) {
     const float s = x * x;
     sine = x * (1.0f + s * (-1.0f / 6 + s * (1.0f / 120 + s * (-1.0f / 5040 + s * (1.0f / 362880)))));
     cosine = 1.0f + s * (-0.5f + s * (1.0f / 24 + s * (-1.0f / 720 + s * (1.0f / 40320))));
 }
 
-// Cosine-distributed direction about the unit normal n: Shirley and Chiu's concentric disk lifted to the hemisphere.
+// A cosine-distributed direction about the unit normal n: Shirley and Chiu's concentric disk, projected to the
+// hemisphere.
 Vec3 cosine_direction(Vec3 n, float random_a, float random_b) {
     constexpr float quarter_pi = 0.785398163f;
     const float a = 2 * random_a - 1, b = 2 * random_b - 1;
@@ -46,12 +50,12 @@ Vec3 cosine_direction(Vec3 n, float random_a, float random_b) {
     return tangent * x + bitangent * y + n * z;
 }
 
-// One thread's paths: traced a bounce at a time, so that the kernel sees batches.
+// One thread's paths, traced bounce by bounce, so that kernels get batches.
 class Wave {
 public:
     explicit Wave(const RenderJob& job) : job_(job) {}
 
-    // All samples of pixels [x_begin, x_end) of a row; returns the rays traced.
+    // Renders all samples of pixels [x_begin, x_end) of a row. Returns the number of rays traced.
     std::uint64_t render(int row, int x_begin, int x_end) {
         const auto pixels = static_cast<std::size_t>(x_end - x_begin);
         std::vector<Vec3> sums(pixels, Vec3{0, 0, 0});
@@ -126,7 +130,8 @@ private:
                            1, job_.in_flight);
     }
 
-    // Paths that escape bring the sky's light home; the others bounce, until they have bounced enough.
+    // Adds the throughput of paths that missed to their pixels, because the sky's radiance is 1, and bounces the others
+    // unless they have reached the bounce limit.
     void shade(int row, int x_begin, int bounce, std::vector<Vec3>& sums) {
         next_origins_.clear();
         next_directions_.clear();
@@ -153,8 +158,8 @@ private:
             const auto random = pcg4d(pixel_index(row, x_begin, path.pixel), path.sample,
                                       static_cast<std::uint32_t>(bounce + 1), job_.seed);
             const Vec3 direction = cosine_direction(facing, to_unit(random[0]), to_unit(random[1]));
-            // Off the surface by more than the point's own rounding error.
-            const Vec3 origin = point + facing * (0x1p-18f * std::max(largest_component(point), largest_component(a)));
+            const Vec3 origin =
+                point + facing * (surface_offset * std::max(largest_component(point), largest_component(a)));
             paths_[alive++] = path;
             next_origins_.insert(next_origins_.end(), {origin.x, origin.y, origin.z});
             next_directions_.insert(next_directions_.end(), {direction.x, direction.y, direction.z});

@@ -1,4 +1,4 @@
-// A path tracer with a white sky and diffuse surfaces: the paper's benchmark, and a picture of a mesh.
+// A path tracer with a white sky and diffuse surfaces: the paper's benchmark, and pictures of meshes.
 #pragma once
 
 #include <cstddef>
@@ -11,13 +11,14 @@
 namespace wive {
 
 struct Camera {
-    Vec3 eye, centre, right, up;  // from the eye to the picture's centre, from there to its right and its top edge
+    Vec3 eye, centre, right, up;  // eye to picture centre; centre to its right and to its top edge
 };
 
 enum class Albedo { gray, normals };
 
-// Closest hits of a batch by somebody else's traversal, for comparisons in which nothing else differs: rays (count, 3),
-// one interval for all; prim -1 on a miss, uv (count, 2) as Embree has it. Called by every rendering thread.
+// The closest hits of a batch by another traversal, for comparisons in which nothing else differs. Rays are (count, 3),
+// with one interval for all; prim is -1 on a miss, uv (count, 2) in Embree's convention. Every rendering thread calls
+// it.
 struct ForeignTracer {
     using Function = void (*)(const void* context, std::size_t count, const float* origins, const float* directions,
                               float tmin, float tmax, float* t, std::int32_t* prim, float* uv);
@@ -28,7 +29,7 @@ struct ForeignTracer {
 struct RenderJob {
     BvhView bvh;
     Mesh<float> mesh;
-    const KernelTable<float>& kernels;  // the only thing that differs between instruction sets
+    const KernelTable<float>& kernels;  // of one instruction set; nothing else depends on it
     Accuracy accuracy;
     NodeForm nodes;
     Camera camera;
@@ -37,11 +38,11 @@ struct RenderJob {
     Albedo albedo;
     std::uint32_t seed;
     float* image;            // (height, width, 3), linear radiance, row 0 at the top
-    unsigned in_flight = 0;  // rays interleaved by each thread; 0: chosen by the batch
+    unsigned in_flight = 0;  // rays interleaved per thread; 0: chosen by the batch's size
     ForeignTracer tracer = {};
 };
 
-// Traces rows [row_begin, row_end) and returns how many rays that took.
+// Renders rows [row_begin, row_end). Returns the number of rays traced.
 std::uint64_t render_rows(const RenderJob& job, int row_begin, int row_end, unsigned threads);
 
 }  // namespace wive
