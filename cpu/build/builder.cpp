@@ -22,7 +22,7 @@ constexpr std::uint32_t largest_leaf(Precision precision, NodeForm form) {
     return compressed_blocks ? max_compressed_leaf / block_width : max_leaf_blocks;
 }
 
-// The centre is moved from the origin only if that is more than this many half extents away from the mesh.
+// On an axis, the centre leaves zero only if the mesh's middle is more than this many half extents away from it.
 constexpr double far_from_origin = 4;
 
 }  // namespace

@@ -21,8 +21,8 @@ namespace {
 
 constexpr std::size_t chunk_size = 1 << 14;
 
-// The lowest index in [0, count) for which is_bad holds, or count. has_bad(begin, end), which is faster per index,
-// tells if a chunk has any.
+// The lowest index in [0, count) for which is_bad holds, or count. has_bad(begin, end) tells if a chunk has any; it is
+// faster per index.
 template <class HasBad, class IsBad>
 std::size_t first_bad(std::size_t count, Threads& threads, const HasBad& has_bad, const IsBad& is_bad) {
     std::atomic<std::size_t> first{count};

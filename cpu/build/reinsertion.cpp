@@ -95,7 +95,7 @@ private:
 
     std::uint32_t sibling(std::uint32_t node) const { return nodes_[nodes_[node].parent].other_child(node); }
 
-    // The target whose place, shared with the subtree, enlarges the tree least; none if nothing gains least_gain.
+    // The target next to which the subtree enlarges the tree least; none if no place gains least_gain.
     // Meister and Bittner's algorithm 2: walk up from the subtree's parent and search each sibling's subtree on the
     // way. Below a node, at least the moved subtree's own area is added, which bounds the search.
     Move find_move(std::uint32_t node, std::vector<std::pair<float, std::uint32_t>>& stack) const {

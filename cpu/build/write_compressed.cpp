@@ -17,7 +17,8 @@ namespace {
 
 constexpr int highest_byte = CompressedNode::highest_plane;
 
-// Of a step. Far from the exponents of denormals, which some programs have the processor flush to zero.
+// The least exponent of a step. Far from the exponents of denormals, which some programs have the processor flush to
+// zero.
 constexpr int lowest_exponent = -110;
 
 // plane - origin, as a rounded double and the rounding error. The comparison with a multiple of the step is exact:
