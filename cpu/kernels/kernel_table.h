@@ -65,7 +65,8 @@ struct KernelMaker {
         else if constexpr (choice.accuracy == Accuracy::watertight)
             return Kernel<Slabs, WatertightTriangles, Asked, choice.counting>{};
         else if constexpr (choice.query == QueryKind::closest)
-            return Kernel<Slabs, ExactTriangles, ExactClosestHit<typename Slabs<Isa>::Form::Block>, choice.counting>{};
+            return Kernel<Slabs, ExactTriangles, ExactClosestHit<typename Slabs<Isa>::Layout::Block>,
+                          choice.counting>{};
         else
             return Kernel<Slabs, ExactTriangles, Asked, choice.counting>{};
     }

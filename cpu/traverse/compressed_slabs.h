@@ -17,26 +17,26 @@ struct CompressedPlanes {
         const Float8 origin = Float8::all(node.origin[axis]), step = Float8::all(node.step[axis]);
         return multiply_add(children(node.planes[0] + row), step * rdir, multiply_add(origin, rdir, bias));
     }
-    template <class Entries>
-    [[gnu::always_inline]] static Entries of_children(const Node& node, Entries entries) {
+    template <class BoxHits>
+    [[gnu::always_inline]] static BoxHits of_children(const Node& node, BoxHits entries) {
         return {entries.tnear, entries.hit.without(entries.hit.of_child(node.child, end_of_stack))};
     }
 };
 
 // Two cache lines hold a node, three a block of either size wherever it begins. Blocks of doubles are not compressed.
 template <class Real>
-struct CompressedForm;
+struct CompressedLayout;
 
 template <>
-struct CompressedForm<double> : CompressedPlanes {
+struct CompressedLayout<double> : CompressedPlanes {
     using Block = TriangleBlockOf<double>;
     template <class Isa>
     using Corners = StoredCorners<Isa>;
-    static constexpr unsigned prefetched_lines = Float32Form<double>::prefetched_lines;
+    static constexpr unsigned prefetched_lines = Float32Layout<double>::prefetched_lines;
 };
 
 template <>
-struct CompressedForm<float> : CompressedPlanes {
+struct CompressedLayout<float> : CompressedPlanes {
     using Block = CompressedBlock;
     template <class Isa>
     using Corners = SharedCorners<Isa>;
@@ -44,6 +44,6 @@ struct CompressedForm<float> : CompressedPlanes {
 };
 
 template <class Isa>
-using CompressedSlabs = RaySlabs<Isa, CompressedForm<typename Isa::Real>>;
+using CompressedSlabs = RaySlabs<Isa, CompressedLayout<typename Isa::Real>>;
 
 }  // namespace wive

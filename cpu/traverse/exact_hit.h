@@ -18,9 +18,9 @@ struct HitNumbers {
     float t, u, v;
 };
 
-// Whether the ray's line hits the closed triangle or, with crossings, whether it passes through it by the rule that
+// Whether the ray's line hits the closed triangle or, with perturb_edges, whether it passes through it by the rule that
 // lets it pass a closed surface at an edge or a vertex exactly as often as beside it (docs/accuracy.md).
-bool hits_exactly(const GivenRay& ray, const Corners& corners, bool crossings, HitNumbers& numbers);
+bool hits_exactly(const GivenRay& ray, const Corners& corners, bool perturb_edges, HitNumbers& numbers);
 
 // The sign of t - limit for a triangle that the line meets.
 int compare_with_limit(const GivenRay& ray, const Corners& corners, float limit);

@@ -12,7 +12,7 @@ namespace wive {
 // by negating reciprocal and bias there.
 template <class Isa>
 struct HalfSlabs {
-    using Form = Float32Form<float>;
+    using Layout = Float32Layout<float>;
     using Node = wive::Node;
 
     __m512 rdir[3], bias[3];
@@ -33,7 +33,7 @@ struct HalfSlabs {
 
     WIVE_INLINE typename Isa::Order order(const Node& node) const { return {node.order, order_shift}; }
 
-    WIVE_INLINE Entries<Isa> test(const Node& node, float tmax) const {
+    WIVE_INLINE BoxHits<Isa> test(const Node& node, float tmax) const {
         const auto planes = [&](unsigned axis) {
             const __m512 near_far =
                 _mm512_insertf32x8(_mm512_castps256_ps512(_mm256_load_ps(planes_from(node, near_row[axis]))),

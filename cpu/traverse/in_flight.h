@@ -33,15 +33,14 @@ class InFlight {
 
 public:
     // Kernels that count do so for each ray alone.
-    using OwnPackets =
-        std::conditional_t<std::is_same_v<Counters, NoCounters> && Together::hits_are_those_of_rays_alone, Together,
-                           NoPackets>;
+    using PacketsOrNone =
+        std::conditional_t<std::is_same_v<Counters, NoCounters> && Together::bit_exact, Together, NoPackets>;
     using State = Flight<typename Triangles<Isa>::Frame, Query, Counters>;
-    using Form = typename Slabs<Isa>::Form;
-    using Corners = typename Form::template Corners<Isa>;
+    using Layout = typename Slabs<Isa>::Layout;
+    using Corners = typename Layout::template Corners<Isa>;
 
     [[gnu::always_inline]] InFlight(const BvhView& bvh, const Rays& rays, const Hits& hits, const RaySource& source,
-                                    OwnPackets& packets, std::byte* scratch)
+                                    PacketsOrNone& packets, std::byte* scratch)
         : bvh_(bvh),
           rays_(rays),
           hits_(hits),
@@ -64,7 +63,7 @@ private:
     // A block some of whose triangles a flight may hit.
     struct Candidate {
         State* flight;
-        const typename Form::Block* block;
+        const typename Layout::Block* block;
         bool last_block;
         typename Triangles<Isa>::Found found;
     };
@@ -83,7 +82,7 @@ private:
                     end_ = next_;
                     return;
                 }
-            } while (packets_.answer(next_, end_));
+            } while (packets_.trace_next(next_, end_));
             new (&f.query) Query{};  // in place: a temporary copied over would stall on its own stores
             f.counters = Counters{};
             if (f.ray.load(bvh_, rays_, next_)) break;
@@ -106,7 +105,7 @@ private:
             while (may_hide & (top.distance() > f.query.interval.box_tmax())) top.move(-1);
         f.top = top;
         const std::uint32_t child = top.child();
-        prefetch<Form>(bvh, child);
+        prefetch<Layout>(bvh, child);
         const bool inner = is_inner(child), end = child == end_of_stack;
         *ends.node = *ends.leaf = *ends.done = &f;
         ends.node += ready & inner;
@@ -128,7 +127,7 @@ private:
                 State& f = **j;
                 Stack::Top top = f.top;
                 f.counters.inner_node();
-                visit<Query::in_order, Isa>(bvh.template node<Form>(top.child()), Slabs<Isa>(f.ray),
+                visit<Query::in_order, Isa>(bvh.template node<Layout>(top.child()), Slabs<Isa>(f.ray),
                                             f.query.interval.box_tmax(), top);
                 f.top = top;
             }
@@ -149,7 +148,7 @@ private:
             State& f = **i;
             Stack::Top top = f.top;
             const std::uint32_t child = top.child();
-            const auto& block = *bvh.template leaf<Form>(child);
+            const auto& block = *bvh.template leaf<Layout>(child);
             const bool last_block = leaf_block_count(child) == 1;
             f.counters.block(block);
             if (last_block) f.counters.leaf();
@@ -189,7 +188,7 @@ private:
     const Rays rays_;
     const Hits hits_;
     const RaySource source_;
-    OwnPackets& packets_;
+    PacketsOrNone& packets_;
     State* flights_;
     State *at_node_[max_in_flight + 1], *at_leaf_[max_in_flight + 1], *done_[max_in_flight + 1];
     Candidate candidates_[max_in_flight + 1];
@@ -204,7 +203,7 @@ void trace_batch(const BvhView& bvh, const RayBatch<typename Isa::Real>& rays, c
         trace_one_by_one<Isa, Slabs, Triangles, Query, Counters>(bvh, rays, hits, source);
     } else {
         using Flights = InFlight<Isa, Slabs, Triangles, typename Query::InFlight, Counters>;
-        typename Flights::OwnPackets packets(bvh, rays, hits, in_flight);
+        typename Flights::PacketsOrNone packets(bvh, rays, hits, in_flight);
         Flights(bvh, rays, hits, source, packets, scratch).trace(in_flight);
     }
 }

@@ -24,18 +24,18 @@ class Packet {
     using Float8 = typename Isa::Float8;
     using Rays = RayBatch<Real>;
     using Hits = HitBatch<Real>;
-    using Form = typename Slabs<Isa>::Form;
-    using Node = typename Form::Node;
-    using Block = typename Form::Block;
-    using Corners = typename Form::template Corners<Isa>;
+    using Layout = typename Slabs<Isa>::Layout;
+    using Node = typename Layout::Node;
+    using Block = typename Layout::Block;
+    using Corners = typename Layout::template Corners<Isa>;
     using Frame = typename Triangles<Isa>::Frame;
 
 public:
     static constexpr unsigned width = 16;
     // Else a ray might come to a leaf that it does not come to alone, and accept what lies outside its box.
-    static constexpr bool hits_are_those_of_rays_alone = Form::boxes_are_nested || Triangles<Isa>::hits_are_in_boxes;
+    static constexpr bool bit_exact = Layout::boxes_are_nested || Triangles<Isa>::hits_are_in_boxes;
 
-    enum class Outcome { refused, paid, did_not_pay };
+    enum class Outcome { refused, worthwhile, not_worthwhile };
 
     Packet(const BvhView& bvh, const Rays& rays, const Hits& hits) : bvh_(bvh), rays_(rays), hits_(hits) {}
 
@@ -44,7 +44,7 @@ public:
         if (!go_together(first, width - 1) || !go_together(first, 1) || !load(first)) return Outcome::refused;
         walk_together();
         for (unsigned i = 0; i < width; ++i) query_[i].write(hits_, first + i, ray_[i].scale);
-        return rays_at_leaves_ >= fewest_rays_a_leaf * leaves_ ? Outcome::paid : Outcome::did_not_pay;
+        return rays_at_leaves_ >= fewest_rays_a_leaf * leaves_ ? Outcome::worthwhile : Outcome::not_worthwhile;
     }
 
 private:
@@ -135,16 +135,16 @@ private:
         // A leaf's box stands in its parent. The children that a node leaves on the stack have its place beside them.
         const auto place = [&](const Stack::Top& top) { return parents_ + (&top.distance() - stack_.distances); };
         walk<Query::in_order, Isa>(
-            bvh_, PacketSlabs<Isa, Form>(bounds_), stack_, [&] { return reach; },
+            bvh_, PacketSlabs<Isa, Layout>(bounds_), stack_, [&] { return reach; },
             [&](std::uint32_t child, const Stack::Top& top) {
                 for (int i = 0; i < node_width; ++i) place(top)[i] = child;
             },
             [&](std::uint32_t child, const Stack::Top& top) {
-                const Node& parent = bvh_.template node<Form>(*place(top));
+                const Node& parent = bvh_.template node<Layout>(*place(top));
                 unsigned rays = rays_at(parent, Isa::Hits::of_child(parent.child, child).first());
                 ++leaves_;
                 rays_at_leaves_ += static_cast<unsigned>(__builtin_popcount(rays));
-                const Block* block = bvh_.template leaf<Form>(child);
+                const Block* block = bvh_.template leaf<Layout>(child);
                 bool found = false;
                 for (std::uint32_t count = leaf_block_count(child); rays != 0 && count > 0;
                      --count, block = block->next())
@@ -160,12 +160,12 @@ private:
         unsigned rays = 0;
         for (unsigned i = 0; i < width; i += node_width) {
             const auto distance = [&](std::size_t row, unsigned axis, const float* bias) {
-                return Form::distance(node, child, row, axis, Float8::load(rdir_[axis] + i), Float8::load(bias + i));
+                return Layout::distance(node, child, row, axis, Float8::load(rdir_[axis] + i), Float8::load(bias + i));
             };
-            const auto meets =
-                entries<Isa>([&](unsigned axis) { return distance(bounds_.near_row[axis], axis, near_bias_[axis]); },
-                             [&](unsigned axis) { return distance(bounds_.far_row[axis], axis, far_bias_[axis]); },
-                             Float8::load(tmin_ + i), Float8::load(reach_ + i));
+            const auto meets = intersect_boxes<Isa>(
+                [&](unsigned axis) { return distance(bounds_.near_row[axis], axis, near_bias_[axis]); },
+                [&](unsigned axis) { return distance(bounds_.far_row[axis], axis, far_bias_[axis]); },
+                Float8::load(tmin_ + i), Float8::load(reach_ + i));
             rays |= meets.hit.bits() << i;
         }
         return rays;
@@ -216,7 +216,7 @@ class Packets {
     using Together = Packet<Isa, Slabs, Triangles, Query>;
 
 public:
-    static constexpr bool hits_are_those_of_rays_alone = Together::hits_are_those_of_rays_alone;
+    static constexpr bool bit_exact = Together::bit_exact;
 
     // With fewer rays in flight than a packet has, there are none.
     Packets(const BvhView& bvh, const auto& rays, const auto& hits, unsigned in_flight)
@@ -225,12 +225,12 @@ public:
 
     // Answers rays from `next` on if enough of them go together, and moves next past them; true then. Where they don't,
     // or it did not pay, more and more of the rays behind are let pass before it is tried again.
-    [[gnu::always_inline]] bool answer(std::size_t& next, std::size_t end) {
+    [[gnu::always_inline]] bool trace_next(std::size_t& next, std::size_t end) {
         if (next < next_try_ || end - next < Together::width) return false;
         const auto outcome = packet_.trace(next);
         const bool answered = outcome != Together::Outcome::refused;
         if (answered) next += Together::width;
-        if (outcome == Together::Outcome::paid) {
+        if (outcome == Together::Outcome::worthwhile) {
             pause_ = 0;
         } else {
             next_try_ = next + pause_;
@@ -248,7 +248,7 @@ private:
 
 struct NoPackets {
     [[gnu::always_inline]] NoPackets(const BvhView&, const auto&, const auto&, unsigned) {}
-    [[gnu::always_inline]] static bool answer(std::size_t, std::size_t) { return false; }
+    [[gnu::always_inline]] static bool trace_next(std::size_t, std::size_t) { return false; }
 };
 
 }  // namespace wive

@@ -21,8 +21,8 @@ struct PacketBounds {
 // lines here to 5u M, and the origins are moved by 64u M (packet.h).
 template <class Isa, class NodesAndBlocks>
 struct PacketSlabs {
-    using Form = NodesAndBlocks;
-    using Node = typename Form::Node;
+    using Layout = NodesAndBlocks;
+    using Node = typename Layout::Node;
     using Float8 = typename Isa::Float8;
 
     Float8 rdir[2][3], near_bias[2][3], far_bias[2][3], tmin;
@@ -40,22 +40,23 @@ struct PacketSlabs {
             near_row[axis] = rays.near_row[axis];
             far_row[axis] = rays.far_row[axis];
         }
-        order_shift = order_shift_of<Form>(rays.order_shift);
+        order_shift = order_shift_of<Layout>(rays.order_shift);
     }
 
     [[gnu::always_inline]] typename Isa::Order order(const Node& node) const { return {node.order, order_shift}; }
 
-    [[gnu::always_inline]] Entries<Isa> test(const Node& node, float tmax) const {
+    [[gnu::always_inline]] BoxHits<Isa> test(const Node& node, float tmax) const {
         constexpr AllChildren<Float8> children;
         const auto near = [&](unsigned axis, unsigned end) {
-            return Form::distance(node, children, near_row[axis], axis, rdir[end][axis], near_bias[end][axis]);
+            return Layout::distance(node, children, near_row[axis], axis, rdir[end][axis], near_bias[end][axis]);
         };
         const auto far = [&](unsigned axis, unsigned end) {
-            return Form::distance(node, children, far_row[axis], axis, rdir[end][axis], far_bias[end][axis]);
+            return Layout::distance(node, children, far_row[axis], axis, rdir[end][axis], far_bias[end][axis]);
         };
-        return Form::of_children(node, entries<Isa>([&](unsigned axis) { return min(near(axis, 0), near(axis, 1)); },
-                                                    [&](unsigned axis) { return max(far(axis, 0), far(axis, 1)); },
-                                                    tmin, Float8::all(tmax)));
+        return Layout::of_children(
+            node, intersect_boxes<Isa>([&](unsigned axis) { return min(near(axis, 0), near(axis, 1)); },
+                                       [&](unsigned axis) { return max(far(axis, 0), far(axis, 1)); }, tmin,
+                                       Float8::all(tmax)));
     }
 };
 

@@ -11,7 +11,7 @@
 
 namespace wive {
 
-// Every query has in_order: whether children are met from front to back, and crossings: whether the number of its
+// Every query has in_order: whether children are met from front to back, and perturb_edges: whether the number of its
 // hits matters, so that a ray must not pass a surface twice where two triangles meet.
 
 // Queries of rays in flight are InFlight ones, where that is another way of the same: a branch that is predicted wrong
@@ -26,7 +26,7 @@ struct alignas(4 * sizeof(Real)) Nearest {
     Word prim;
 
     // Becomes that hit where it is better: no branch. Returns t, which need not be looked up again.
-    [[gnu::always_inline]] Real become_if(bool better, Real hit_t, Real hit_u, Real hit_v, Word hit_prim) {
+    [[gnu::always_inline]] Real replace_if(bool better, Real hit_t, Real hit_u, Real hit_v, Word hit_prim) {
         typedef Word Words __attribute__((vector_size(4 * sizeof(Word))));
         const Words hit = {std::bit_cast<Word>(hit_t), std::bit_cast<Word>(hit_u), std::bit_cast<Word>(hit_v),
                            hit_prim};
@@ -45,7 +45,7 @@ struct ClosestHit {
     using InFlight = ClosestHit<Real, true>;
     // Children are met from front to back and kept with their distances, because tmax falls with every hit found.
     static constexpr bool in_order = true;
-    static constexpr bool crossings = false;
+    static constexpr bool perturb_edges = false;
 
     Interval<Real> interval;  // ends at the best hit
     Nearest<Real> best;
@@ -55,7 +55,7 @@ struct ClosestHit {
     [[gnu::always_inline]] bool offer(Real t, Real u, Real v, std::uint32_t prim) {
         if constexpr (in_flight) {
             const bool nearer = (t < interval.tmax) | ((t == interval.tmax) & (prim < best.prim));
-            interval.end_at(best.become_if((t >= interval.tmin) & nearer, t, u, v, prim));
+            interval.end_at(best.replace_if((t >= interval.tmin) & nearer, t, u, v, prim));
         } else if (t >= interval.tmin && (t < interval.tmax || (t == interval.tmax && prim < best.prim))) {
             interval.end_at(t);
             best = {t, u, v, prim};
@@ -80,7 +80,7 @@ struct AnyHit {
     using InFlight = AnyHit;
     // Any hit ends the query, so children are taken as they stand: cheaper, and fewer steps as well.
     static constexpr bool in_order = false;
-    static constexpr bool crossings = false;
+    static constexpr bool perturb_edges = false;
 
     Interval<Real> interval{};
     bool hit = false;

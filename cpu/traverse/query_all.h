@@ -11,8 +11,8 @@ namespace wive {
 template <class Real>
 struct CountHits {
     using InFlight = CountHits;
-    static constexpr bool in_order = false;  // all are wanted, whichever comes first
-    static constexpr bool crossings = true;  // how often a ray passes a surface must come out right
+    static constexpr bool in_order = false;      // all are wanted, whichever comes first
+    static constexpr bool perturb_edges = true;  // how often a ray passes a surface must come out right
 
     Interval<Real> interval{};
     std::int32_t count = 0;
@@ -35,7 +35,7 @@ template <class Real>
 struct AllHits {
     using InFlight = AllHits;
     static constexpr bool in_order = false;
-    static constexpr bool crossings = true;
+    static constexpr bool perturb_edges = true;
 
     Interval<Real> interval{};
     Real scale = 1;

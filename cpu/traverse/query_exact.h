@@ -13,7 +13,7 @@ template <class Block>
 struct ExactClosestHit {
     using InFlight = ExactClosestHit;
     static constexpr bool in_order = true;
-    static constexpr bool crossings = false;
+    static constexpr bool perturb_edges = false;
     static constexpr bool wants_uv = true;
 
     Interval<float> interval{};  // for the boxes, in the frame's units; ends at the best hit

@@ -9,7 +9,7 @@ namespace wive {
 
 // Where the ray enters each box, and which of them it meets.
 template <class Isa>
-struct Entries {
+struct BoxHits {
     typename Isa::Float8 tnear;
     typename Isa::Hits hit;
 };
@@ -33,7 +33,7 @@ struct OneChild {
 
 // The nodes and blocks that were not compressed, and the cache lines of a node, or of a block of doubles.
 template <class Real>
-struct Float32Form {
+struct Float32Layout {
     using Node = wive::Node;
     using Block = TriangleBlockOf<Real>;
     template <class Isa>
@@ -49,23 +49,23 @@ struct Float32Form {
         return multiply_add(children(planes_from(node, row)), rdir, bias);
     }
     // Without the lanes that have no child.
-    template <class Entries>
-    [[gnu::always_inline]] static Entries of_children(const Node&, Entries entries) {
+    template <class BoxHits>
+    [[gnu::always_inline]] static BoxHits of_children(const Node&, BoxHits entries) {
         return entries;
     }
 };
 
 // A frame counts in four bits a sequence.
-template <class Form>
+template <class Layout>
 [[gnu::always_inline]] constexpr unsigned order_shift_of(unsigned shift) {
-    return shift * Form::order_bits / 4;
+    return shift * Layout::order_bits / 4;
 }
 
 // Entry and exit distances, cut to [tmin, tmax]; a child is hit where entry <= exit. Near and far say where an axis'
 // planes are met, of a node's children or, for as many rays, of one child.
 template <class Isa>
-[[gnu::always_inline]] inline Entries<Isa> entries(const auto& near, const auto& far, typename Isa::Float8 tmin,
-                                                   typename Isa::Float8 tmax) {
+[[gnu::always_inline]] inline BoxHits<Isa> intersect_boxes(const auto& near, const auto& far, typename Isa::Float8 tmin,
+                                                           typename Isa::Float8 tmax) {
     const auto tnear = max(max(near(0u), near(1u)), max(near(2u), tmin));
     return {tnear, hits(tnear, min(min(far(0u), far(1u)), min(far(2u), tmax)))};
 }
@@ -73,8 +73,8 @@ template <class Isa>
 // The paper's full form: entry and exit distances in two registers of eight lanes.
 template <class Isa, class NodesAndBlocks>
 struct RaySlabs {
-    using Form = NodesAndBlocks;
-    using Node = typename Form::Node;
+    using Layout = NodesAndBlocks;
+    using Node = typename Layout::Node;
     using Float8 = typename Isa::Float8;
 
     Float8 rdir[3], near_bias[3], far_bias[3], tmin;
@@ -89,26 +89,26 @@ struct RaySlabs {
             near_row[axis] = ray.near_row[axis];
             far_row[axis] = ray.far_row[axis];
         }
-        order_shift = order_shift_of<Form>(ray.order_shift);
+        order_shift = order_shift_of<Layout>(ray.order_shift);
     }
 
     [[gnu::always_inline]] typename Isa::Order order(const Node& node) const { return {node.order, order_shift}; }
 
-    [[gnu::always_inline]] Entries<Isa> test(const Node& node, float tmax) const {
+    [[gnu::always_inline]] BoxHits<Isa> test(const Node& node, float tmax) const {
         constexpr AllChildren<Float8> children;
-        return Form::of_children(
-            node, entries<Isa>(
+        return Layout::of_children(
+            node, intersect_boxes<Isa>(
                       [&](unsigned axis) {
-                          return Form::distance(node, children, near_row[axis], axis, rdir[axis], near_bias[axis]);
+                          return Layout::distance(node, children, near_row[axis], axis, rdir[axis], near_bias[axis]);
                       },
                       [&](unsigned axis) {
-                          return Form::distance(node, children, far_row[axis], axis, rdir[axis], far_bias[axis]);
+                          return Layout::distance(node, children, far_row[axis], axis, rdir[axis], far_bias[axis]);
                       },
                       tmin, Float8::all(tmax)));
     }
 };
 
 template <class Isa>
-using FullSlabs = RaySlabs<Isa, Float32Form<typename Isa::Real>>;
+using FullSlabs = RaySlabs<Isa, Float32Layout<typename Isa::Real>>;
 
 }  // namespace wive

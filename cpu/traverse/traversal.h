@@ -1,6 +1,6 @@
 // WiVe: single-ray traversal of the 8-wide tree, the same steps for every node whatever it holds.
 //
-// Fuetterling, Lojewski, Pfreundt, Hamann, Ebert: "Accelerated Single Ray Tracing for Wide Vector Units", HPG 2017.
+// Fuetterling, Lojewski, Pfreundt, Hamann, Ebert: "Accelerated Single Ray Tracing for BigInt Vector Units", HPG 2017.
 // Isa picks the instruction set, Slabs the form of the slab test and of the nodes, Triangles the accuracy, Query what
 // is asked, Counters whether steps are counted. A kernel holds only the code of what it was made for.
 #pragma once
@@ -38,10 +38,10 @@ struct StepCounters {
 
 // Starts loading the first cache lines of what a child reference points to: a whole node, or one block and more. The
 // address is an integer, because end_of_stack points nowhere; a prefetch of such an address does nothing.
-template <class Form>
+template <class Layout>
 [[gnu::always_inline]] inline void prefetch(const BvhView& bvh, std::uint32_t child) {
     const std::uintptr_t address = reinterpret_cast<std::uintptr_t>(bvh.units) + child_offset(child);
-    for (unsigned line = 0; line < Form::prefetched_lines; ++line)
+    for (unsigned line = 0; line < Layout::prefetched_lines; ++line)
         __builtin_prefetch(reinterpret_cast<const void*>(address + 64 * line));
 }
 
@@ -80,25 +80,25 @@ template <bool in_order, class Isa, class Slabs>
 template <bool in_order, class Isa, class Slabs>
 [[gnu::always_inline]] inline std::uint32_t visit_and_take(const BvhView& bvh, const typename Slabs::Node& node,
                                                            const Slabs& slabs, float tmax, Stack::Top& top) {
-    using Form = typename Slabs::Form;
+    using Layout = typename Slabs::Layout;
     const auto order = slabs.order(node);
     const auto [tnear, hit] = slabs.test(node, tmax);
     const unsigned count = hit.count();
     if (count == 0) {
         top.move(-1);
-        prefetch<Form>(bvh, top.child(-2));
+        prefetch<Layout>(bvh, top.child(-2));
         return top.child();
     }
     if constexpr (in_order)
         if (count == 1) {
-            prefetch<Form>(bvh, top.child(-1));
+            prefetch<Layout>(bvh, top.child(-1));
             return node.child[hit.first()];
         }
     const typename Isa::template Lanes<in_order> lanes(order, hit, tnear, node.child);
     lanes.compress_to(top);
     top.move(static_cast<std::ptrdiff_t>(count) - 1);
-    prefetch<Form>(bvh, top.child(-1));
-    prefetch<Form>(bvh, top.child(-2));
+    prefetch<Layout>(bvh, top.child(-1));
+    prefetch<Layout>(bvh, top.child(-2));
     if constexpr (in_order)
         return lanes.last_hit();
     else
@@ -120,7 +120,7 @@ template <class Query, class Isa>
 template <bool in_order, class Isa, class Slabs>
 [[gnu::always_inline]] inline void walk(const BvhView& bvh, const Slabs& slabs, Stack& stack, const auto& reach,
                                         const auto& at_node, const auto& at_leaf) {
-    using Form = typename Slabs::Form;
+    using Layout = typename Slabs::Layout;
     Stack::Top top(stack);
     std::uint32_t child = inner_child(0);  // the root
     if constexpr (in_order)
@@ -137,13 +137,13 @@ template <bool in_order, class Isa, class Slabs>
     for (;;) {
         while (is_inner(child)) {
             at_node(child, top);
-            child = visit_and_take<in_order, Isa>(bvh, bvh.template node<Form>(child), slabs, reach(), top);
+            child = visit_and_take<in_order, Isa>(bvh, bvh.template node<Layout>(child), slabs, reach(), top);
             skip_hidden();
         }
         if (child == end_of_stack || at_leaf(child, top)) return;
         take_next();
         skip_hidden();
-        prefetch<Form>(bvh, top.child(-2));
+        prefetch<Layout>(bvh, top.child(-2));
     }
 }
 
@@ -151,8 +151,8 @@ template <bool in_order, class Isa, class Slabs>
 template <class Isa, template <class> class Slabs, template <class> class Triangles, class Query, class Counters>
 [[gnu::noinline]] void traverse(const BvhView& bvh, const typename Triangles<Isa>::Frame& ray, Query& result,
                                 Counters& counters) {
-    using Form = typename Slabs<Isa>::Form;
-    using Corners = typename Form::template Corners<Isa>;
+    using Layout = typename Slabs<Isa>::Layout;
+    using Corners = typename Layout::template Corners<Isa>;
     Query query = result;
     Stack stack;
     walk<Query::in_order, Isa>(
@@ -161,7 +161,7 @@ template <class Isa, template <class> class Slabs, template <class> class Triang
         [&](std::uint32_t child, const Stack::Top&) {
             counters.leaf();
             const Triangles<Isa> triangles(ray);  // made here: registers are for what nodes need
-            return test_leaf<Corners>(bvh.template leaf<Form>(child), leaf_block_count(child), triangles, query,
+            return test_leaf<Corners>(bvh.template leaf<Layout>(child), leaf_block_count(child), triangles, query,
                                       counters);
         });
     result = query;

@@ -131,7 +131,7 @@ public:
             const int lane = __builtin_ctz(lanes);
             HitNumbers hit = {ts[lane], us[lane], vs[lane]};
             if (doubt >> lane & 1u) [[unlikely]] {
-                if (!hits_exactly(ray_.given(), corners_of(corners.block, lane), Query::crossings, hit)) continue;
+                if (!hits_exactly(ray_.given(), corners_of(corners.block, lane), Query::perturb_edges, hit)) continue;
             }
             if (!within_limits(corners.block, lane, hit.t)) continue;
             if (offer(corners.block, lane, hit, query)) return true;

@@ -89,7 +89,7 @@ public:
             unsigned lanes = found.lanes;
             Float4 side = found.side;
             if (const unsigned ties = lanes & found.ties; ties != 0) [[unlikely]]
-                lanes = settle_ties(corners.block, lanes, ties, side);
+                lanes = resolve_zero_edges(corners.block, lanes, ties, side);
             alignas(16) float ts[4], us[4], vs[4];
             intersect(corners, lanes, side, ts, us, vs);
             return offer_lanes(corners.block, lanes, ts, us, vs, query);
@@ -150,7 +150,8 @@ private:
 
     // Decides the lanes in which rounding hid a sign; returns the lanes that remain.
     template <class Block>
-    [[gnu::noinline]] unsigned settle_ties(const Block& block, unsigned lanes, unsigned ties, Float4& side) const {
+    [[gnu::noinline]] unsigned resolve_zero_edges(const Block& block, unsigned lanes, unsigned ties,
+                                                  Float4& side) const {
         alignas(16) float sides[4];
         side.store(sides);
         for (; ties != 0; ties &= ties - 1) {

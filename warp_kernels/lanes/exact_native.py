@@ -99,8 +99,8 @@ _SOLVE = (
 """
     + _SETUP
     + """
-    const Meeting meeting(from, way, corners, Meeting::unit_of(from, corners));
-    hit[3] = (crossings ? meeting.crosses : meeting.hit) ? 1.0f : 0.0f;
+    const ExactIntersection meeting(from, way, corners, ExactIntersection::unit_of(from, corners));
+    hit[3] = (crossings ? meeting.hit_perturbed : meeting.hit) ? 1.0f : 0.0f;
     if (hit[3] == 0.0f) return hit;
     hit[0] = meeting.t();
     hit[1] = meeting.u();
@@ -119,7 +119,7 @@ _WITHIN = (
 """
     + _SETUP
     + """
-    const Meeting meeting(from, way, corners, Meeting::unit_of(from, corners));
+    const ExactIntersection meeting(from, way, corners, ExactIntersection::unit_of(from, corners));
     return !(at_tmin && meeting.compare(tmin) < 0) && !(at_tmax && meeting.compare(tmax) > 0);
 """
 )
@@ -129,8 +129,8 @@ _COMPARE = (
     + """
     float others[9];
     for (int i = 0; i < 9; ++i) others[i] = ((const float*)units)[other[i / 3] + other_stride * (i % 3)];
-    const int unit = Meeting::unit_of(from, others, Meeting::unit_of(from, corners));
-    return Meeting(from, way, corners, unit).compare(Meeting(from, way, others, unit));
+    const int unit = ExactIntersection::unit_of(from, others, ExactIntersection::unit_of(from, corners));
+    return ExactIntersection(from, way, corners, unit).compare(ExactIntersection(from, way, others, unit));
 """
 )
 
