@@ -6,7 +6,7 @@ namespace wive {
 namespace {
 
 #include "traverse/exact_integer.inc"
-#include "traverse/exact_meeting.inc"
+#include "traverse/exact_intersection.inc"
 
 ExactIntersection meet(const GivenRay& ray, const Corners& corners) {
     return {ray.origin, ray.direction, corners.v, ExactIntersection::unit_of(ray.origin, corners.v)};
