@@ -1,6 +1,7 @@
-// Every hit that one thread finds, in the order it finds them: rays in flight take turns, so theirs are mixed.
+// The hits of one thread, in the order they are found: those of rays in flight are interleaved.
 #pragma once
 
+#include <cassert>
 #include <cstddef>
 #include <cstdint>
 #include <utility>
@@ -17,9 +18,9 @@ struct FoundHit {
     std::int32_t prim;
 };
 
-// A list in chunks that double in size: what was found is never moved, and at most as much again stands empty.
-// All but `add` is compiled once, in hit_list.cpp, not for each instruction set: the linker keeps one copy of an
-// inline function, and it may be one that this machine can't run.
+// A list in chunks that double in size: hits are never moved, and at most half of the memory is unused. All functions
+// but `add` are compiled once, in hit_list.cpp, not for each instruction set: the linker keeps one copy of an inline
+// function, which might be one that this machine can't run.
 template <class Real>
 class alignas(64) HitList {
     using FoundHit = wive::FoundHit<Real>;
@@ -28,14 +29,15 @@ public:
     HitList();
     ~HitList();
 
-    // Throws std::bad_alloc, with the list as it was.
+    // Throws std::bad_alloc, with the list unchanged.
     [[gnu::always_inline]] void add(const FoundHit& hit) {
+        assert(hit.prim >= 0);
         if (next_ == end_) [[unlikely]]
             grow();
         *next_++ = hit;
     }
 
-    // Calls use(hit) for each and frees the memory as it goes.
+    // Calls use(hit) for every hit, and frees each chunk when its hits have been used.
     template <class Use>
     void drain(const Use& use) {
         for (std::size_t i = 0; i < chunks_.size(); ++i) {
@@ -50,7 +52,7 @@ public:
 private:
     void grow();
 
-    FoundHit *next_ = nullptr, *end_ = nullptr;  // what is free of the last chunk
+    FoundHit *next_ = nullptr, *end_ = nullptr;  // the free part of the last chunk
     std::vector<LargeArray<FoundHit>> chunks_;
 };
 
