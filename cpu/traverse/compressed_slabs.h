@@ -1,16 +1,16 @@
-// The ray against the eight boxes of a compressed node.
+// The slab test of one ray against the eight boxes of a compressed node.
 #pragma once
 
 #include "traverse/slabs.h"
 
 namespace wive {
 
-// The distance to a plane is byte * (step * rdir) + (origin * rdir + bias).
 struct CompressedPlanes {
     using Node = CompressedNode;
     static constexpr unsigned order_bits = 3;
     static constexpr bool boxes_are_nested = false;  // each is rounded by the steps of its own node
 
+    // byte * (step * rdir) + (origin * rdir + bias)
     template <class Float8>
     [[gnu::always_inline]] static Float8 distance(const Node& node, auto children, std::size_t row, unsigned axis,
                                                   Float8 rdir, Float8 bias) {
@@ -18,32 +18,32 @@ struct CompressedPlanes {
         return multiply_add(children(node.planes[0] + row), step * rdir, multiply_add(origin, rdir, bias));
     }
     template <class BoxHits>
-    [[gnu::always_inline]] static BoxHits of_children(const Node& node, BoxHits entries) {
-        return {entries.tnear, entries.hit.without(entries.hit.of_child(node.child, end_of_stack))};
+    [[gnu::always_inline]] static BoxHits drop_empty_lanes(const Node& node, BoxHits hits) {
+        return {hits.tnear, hits.hit.without(hits.hit.of_child(node.child, end_of_stack))};
     }
 };
 
-// Two cache lines hold a node, three a block of either size wherever it begins. Blocks of doubles are not compressed.
+// Compressed nodes. So are blocks of floats, but not blocks of doubles.
 template <class Real>
 struct CompressedLayout;
 
 template <>
 struct CompressedLayout<double> : CompressedPlanes {
     using Block = TriangleBlockOf<double>;
-    template <class Isa>
-    using Corners = StoredCorners<Isa>;
+    template <class I>
+    using Corners = StoredCorners<I>;
     static constexpr unsigned prefetched_lines = Float32Layout<double>::prefetched_lines;
 };
 
 template <>
 struct CompressedLayout<float> : CompressedPlanes {
     using Block = CompressedBlock;
-    template <class Isa>
-    using Corners = SharedCorners<Isa>;
-    static constexpr unsigned prefetched_lines = 3;
+    template <class I>
+    using Corners = SharedCorners<I>;
+    static constexpr unsigned prefetched_lines = 3;  // a block of either size wherever it begins; a node has two
 };
 
-template <class Isa>
-using CompressedSlabs = RaySlabs<Isa, CompressedLayout<typename Isa::Real>>;
+template <class I>
+using CompressedSlabs = RaySlabs<I, CompressedLayout<typename I::Real>>;
 
 }  // namespace wive

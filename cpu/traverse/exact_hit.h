@@ -1,31 +1,31 @@
-// The exact answers that triangle_exact.h asks for where floating point is in doubt. Slow, rarely needed, and compiled
-// once for every instruction set.
+// The exact arithmetic that triangle_exact.h falls back on when floating point leaves a doubt. Slow, rarely needed, and
+// compiled once for all instruction sets.
 #pragma once
 
 namespace wive {
 
-// As the caller gave it: t counts in lengths of this direction.
-struct GivenRay {
+// A ray as the caller gave it: t is in multiples of the length of this direction.
+struct CallerRay {
     float origin[3], direction[3];
 };
 
-struct Corners {
+struct TriangleCorners {
     float v[9];  // three times x, y, z
 };
 
-// Of a hit, each the float nearest to the exact value.
-struct HitNumbers {
+// t, u and v of a hit, each the float nearest to the exact value.
+struct RoundedHit {
     float t, u, v;
 };
 
-// Whether the ray's line hits the closed triangle or, with perturb_edges, whether it passes through it by the rule that
-// lets it pass a closed surface at an edge or a vertex exactly as often as beside it (docs/accuracy.md).
-bool hits_exactly(const GivenRay& ray, const Corners& corners, bool perturb_edges, HitNumbers& numbers);
+// Whether the ray's line hits the closed triangle; fills in `hit` if it does. With perturb_edges, a line that meets an
+// edge or a vertex of a closed surface hits it exactly as often as a line beside it does (docs/accuracy.md).
+bool hits_exactly(const CallerRay& ray, const TriangleCorners& corners, bool perturb_edges, RoundedHit& hit);
 
-// The sign of t - limit for a triangle that the line meets.
-int compare_with_limit(const GivenRay& ray, const Corners& corners, float limit);
+// The sign of t - limit for a triangle that the line hits.
+int compare_with_limit(const CallerRay& ray, const TriangleCorners& corners, float limit);
 
-// The sign of the difference of the t of two triangles that the line meets.
-int compare_distances(const GivenRay& ray, const Corners& one, const Corners& other);
+// The sign of the difference between the t of two triangles that the line hits.
+int compare_distances(const CallerRay& ray, const TriangleCorners& one, const TriangleCorners& other);
 
 }  // namespace wive

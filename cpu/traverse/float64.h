@@ -1,12 +1,14 @@
-// An instruction set whose scenes hold doubles: boxes are met as ever, rays and triangles in double.
+// An instruction set for scenes of doubles: rays and triangles in double, boxes in float.
 #pragma once
+
+#include "traverse/concepts.h"
 
 namespace wive {
 
-template <class Isa>
-struct Float64 : Isa {
+template <Isa Base>
+struct Float64 : Base {
     using Real = double;
-    using Real4 = typename Isa::Double4;
+    using Real4 = typename Base::Double4;
 };
 
 }  // namespace wive

@@ -1,7 +1,8 @@
-// A ray made ready for traversal: checked, scaled, and its reciprocal and slab offsets taken once.
+// A ray prepared for traversal: checked and scaled, with its reciprocal and slab offsets computed once.
 #pragma once
 
 #include <bit>
+#include <cassert>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -11,6 +12,7 @@
 #include "core/interval.h"
 #include "core/layout.h"
 #include "core/ray.h"
+#include "traverse/concepts.h"
 
 namespace wive {
 
@@ -30,32 +32,33 @@ namespace wive {
 // there is no fused multiply-add. Such planes may lie up to a step outside, which is below P / 60: 15u M in all.
 // A float64 ray meets the same boxes, all of this in float: its direction is rounded, which adds u(P + O) from r; o =
 // origin - centre is taken in double, so that its one rounding to float is the u O above. The triangle tests move
-// vertices sideways by multiples of 2^-53 M; where the weights of a hit have so little to say that they would move it
-// by more, they are taken exactly (triangle_watertight_float64.h), so that a hit lies no more than 3u M aside: 13u M in
-// all with compressed planes. A component smaller than 2^-30 of the longest counts as that, with its sign: along the
+// vertices sideways by multiples of 2^-53 M; if rounding of the weights would move a hit by more, they are computed
+// exactly (triangle_watertight_float64.h), so that a hit lies no more than 3u M aside: 13u M in all with compressed
+// planes. A component smaller than 2^-30 of the longest is replaced by that, with its sign: along the
 // ray that moves a point by less than 2^-29 M, which the same slack covers. (A subnormal direction stays shorter than 1
-// when scaled.) Real, of Isa: the caller's numbers, and those of the triangle test.
-template <class Isa>
+// when scaled.)
+// Real is the precision of the caller's rays and of the triangle test.
+template <Isa I>
 struct RayFrame {
-    using Real = typename Isa::Real;
-    using Real4 = typename Isa::Real4;
-    using Float4 = typename Isa::Float4;
+    using Real = typename I::Real;
+    using Real4 = typename I::Real4;
+    using Float4 = typename I::Float4;
 
-    // Three values each; the fourth lane only makes them whole registers.
+    // Three values each; the fourth lane only fills up a register.
     alignas(4 * sizeof(Real)) Real origin[4];
     alignas(4 * sizeof(Real)) Real direction[4];
     alignas(16) float rdir[4];
     alignas(16) float near_bias[4];
     alignas(16) float far_bias[4];
     Interval<Real> interval;
-    Real scale;  // t of the caller's ray = scale * t here
-    std::uint32_t near_row[3],
-        far_row[3];             // in planes from a node's first one: the rows that the ray meets first and last
-    std::uint32_t order_shift;  // of a node's order, four bits a sequence: the octant's, from back to front
+    Real scale;                             // t of the caller's ray = scale * t here
+    std::uint32_t near_row[3], far_row[3];  // the rows of planes that the ray meets first and last, in floats from a
+                                            // node's first plane
+    std::uint32_t order_shift;              // to the bits of the ray's octant, farthest first, of four bits per octant
     unsigned longest_axis;
 
-    // False where the ray hits nothing by rule: an origin or a direction that is no number or out of range, a
-    // direction of length zero, an empty interval.
+    // Returns false if the ray hits nothing by rule: if its origin or direction is NaN or out of range, its direction
+    // zero or its interval empty.
     [[gnu::always_inline]] bool load(const BvhView& bvh, const RayBatch<Real>& rays, std::size_t i) {
         const Real *o = rays.origins + 3 * i, *d = rays.directions + 3 * i;
         const Real4 caller_origin = Real4::set(o[0], o[1], o[2], 0), caller_direction = Real4::set(d[0], d[1], d[2], 0);
@@ -78,18 +81,18 @@ struct RayFrame {
         interval = Interval<Real>::of(caller_tmin * unscale, caller_tmax * unscale);
 
         constexpr float smallest_part = 0x1p-30f, slack_factor = 0x1p-20f;
-        constexpr float least_reach = 0x1p-100f;  // keeps the slack from vanishing where everything is tiny
+        constexpr float least_magnitude = 0x1p-100f;  // keeps the slack from vanishing if everything is tiny
         const Real4 scaled_direction = caller_direction * Real4::all(scale);
-        const Float4 scaled = Float4::narrow(scaled_direction);  // signs stay, also where a component becomes zero
+        const Float4 scaled = Float4::narrow(scaled_direction);  // signs are kept, even if a component becomes zero
         const Float4 relative = Float4::narrow(caller_origin - Real4::of(Float4::load(bvh.center)));
-        const float reach = highest_lane(Float4::load(bvh.extent) + abs(relative)) + least_reach;
+        const float magnitude = highest_lane(Float4::load(bvh.extent) + abs(relative)) + least_magnitude;
         const float smallest = static_cast<float>(longest * scale) * smallest_part;
         const Float4 size = Float4::all(1.0f) / max(abs(scaled), Float4::all(smallest));
         const Float4 reciprocal = flip_sign(size, scaled);
-        const Float4 distance = relative * reciprocal, slack = size * Float4::all(reach * slack_factor);
+        const Float4 distance = relative * reciprocal, slack = size * Float4::all(magnitude * slack_factor);
         const unsigned octant = sign_bits(scaled) & 7u;  // bit a: negative on axis a, from the sign of the reciprocal
-        order_shift =
-            4 * (7 - octant);  // the stack wants the farthest child first, and octant 7 - o is octant o backwards
+        assert(octant < 8);
+        order_shift = 4 * (7 - octant);  // farthest first, as the stack needs: octant 7 - o is octant o in reverse
         longest_axis = static_cast<unsigned>(std::countr_zero(less_equal(Real4::all(longest), lengths)));
         for (unsigned axis = 0; axis < 3; ++axis) {
             near_row[axis] = node_width * (2 * axis + (octant >> axis & 1u));
@@ -102,15 +105,24 @@ struct RayFrame {
         (slack - distance).store(far_bias);
         return true;
     }
+
+    // What load() guarantees when it returns true; asserted when traversal begins.
+    [[gnu::always_inline]] bool is_finite() const {
+        bool finite = interval.tmin <= interval.tmax;
+        for (int axis = 0; axis < 3; ++axis)
+            finite = finite && std::isfinite(origin[axis]) && std::isfinite(direction[axis]) &&
+                     std::isfinite(rdir[axis]) && std::isfinite(near_bias[axis]) && std::isfinite(far_bias[axis]);
+        return finite;
+    }
 };
 
-// With the axes of a space in which the ray runs along the third, the longest of its direction.
-template <class Isa>
-struct AxisFrame : RayFrame<Isa> {
-    std::uint32_t axis[3];
+// A ray with its axes permuted, so that the longest component of its direction comes last.
+template <Isa I>
+struct AxisFrame : RayFrame<I> {
+    std::uint32_t axis[3];  // a cyclic permutation of 0, 1, 2
 
-    [[gnu::always_inline]] bool load(const BvhView& bvh, const RayBatch<typename Isa::Real>& rays, std::size_t i) {
-        if (!RayFrame<Isa>::load(bvh, rays, i)) [[unlikely]]
+    [[gnu::always_inline]] bool load(const BvhView& bvh, const RayBatch<typename I::Real>& rays, std::size_t i) {
+        if (!RayFrame<I>::load(bvh, rays, i)) [[unlikely]]
             return false;
         constexpr unsigned following = 0b001001;  // the axis after axis i, two bits each
         axis[2] = this->longest_axis;

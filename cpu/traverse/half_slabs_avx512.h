@@ -8,9 +8,9 @@
 
 namespace wive {
 
-// The upper half holds negated exit distances, so that one max serves both halves. It comes from the far planes
-// by negating reciprocal and bias there.
-template <class Isa>
+// The upper half holds exit distances negated, so that one max serves both halves. Negating the reciprocal and the bias
+// of the far planes negates their distances.
+template <class I>
 struct HalfSlabs {
     using Layout = Float32Layout<float>;
     using Node = wive::Node;
@@ -20,7 +20,7 @@ struct HalfSlabs {
     std::size_t near_row[3], far_row[3];  // in planes from the node's first
     unsigned order_shift;
 
-    WIVE_INLINE explicit HalfSlabs(const RayFrame<Isa>& ray)
+    WIVE_INLINE explicit HalfSlabs(const RayFrame<I>& ray)
         : tmin_and_tmax(both(ray.interval.tmin, -ray.interval.tmax)) {
         for (unsigned axis = 0; axis < 3; ++axis) {
             rdir[axis] = both(ray.rdir[axis], -ray.rdir[axis]);
@@ -31,9 +31,9 @@ struct HalfSlabs {
         order_shift = ray.order_shift;
     }
 
-    WIVE_INLINE typename Isa::Order order(const Node& node) const { return {node.order, order_shift}; }
+    WIVE_INLINE typename I::Order order(const Node& node) const { return {node.order, order_shift}; }
 
-    WIVE_INLINE BoxHits<Isa> test(const Node& node, float tmax) const {
+    WIVE_INLINE BoxHits<I> test(const Node& node, float tmax) const {
         const auto planes = [&](unsigned axis) {
             const __m512 near_far =
                 _mm512_insertf32x8(_mm512_castps256_ps512(_mm256_load_ps(planes_from(node, near_row[axis]))),
@@ -51,5 +51,6 @@ private:
         return _mm512_insertf32x8(_mm512_set1_ps(low), _mm256_set1_ps(high), 1);
     }
 };
+static_assert(SlabTest<HalfSlabs<Avx512>, Avx512>);
 
 }  // namespace wive

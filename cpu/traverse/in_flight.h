@@ -1,11 +1,12 @@
-// Many rays in flight on one thread: each does exactly the single-ray traversal, one step at a time in turns.
+// Many rays in flight on one thread, each traversed one step at a time in turns.
 //
-// One ray's next node is known only when its last is done, and then it may have to come from memory. Here the others
-// take their turns meanwhile: a ray's next node or leaf is prefetched when it becomes known and visited a round later.
-// Hits are those of the single ray, bit for bit: nothing passes between rays. Rays that go together need no turns:
-// packet.h.
+// The next node of a ray is known only when the last one is done, and may then have to come from memory. Interleaving
+// hides that latency: a ray's next node or leaf is prefetched as soon as it is known and visited a round later. Each
+// ray does exactly the single-ray traversal, and nothing passes between rays, so hits are the same bits. Coherent rays
+// are faster in packets: packet.h.
 #pragma once
 
+#include <cassert>
 #include <new>
 #include <type_traits>
 
@@ -14,6 +15,7 @@
 
 namespace wive {
 
+// A ray in flight.
 template <class Frame, class Query, class Counters>
 struct alignas(64) Flight {
     Frame ray;
@@ -24,21 +26,22 @@ struct alignas(64) Flight {
     Stack stack;
 };
 
-template <class Isa, template <class> class Slabs, template <class> class Triangles, class Query, class Counters>
+template <Isa I, template <class> class Slabs, template <class> class Triangles, class Query, StepCounter Counters>
+    requires Traversable<I, Slabs, Triangles, Query>
 class InFlight {
-    using Rays = RayBatch<typename Isa::Real>;
-    using Hits = HitBatch<typename Isa::Real>;
-
-    using Together = Packets<Isa, Slabs, Triangles, Query>;
+    using Rays = RayBatch<typename I::Real>;
+    using Hits = HitBatch<typename I::Real>;
+    using AllPackets = Packets<I, Slabs, Triangles, Query>;
 
 public:
-    // Kernels that count do so for each ray alone.
+    // Packets are used only if they give the same bits, and not by kernels that count the steps of each ray.
     using PacketsOrNone =
-        std::conditional_t<std::is_same_v<Counters, NoCounters> && Together::bit_exact, Together, NoPackets>;
-    using State = Flight<typename Triangles<Isa>::Frame, Query, Counters>;
-    using Layout = typename Slabs<Isa>::Layout;
-    using Corners = typename Layout::template Corners<Isa>;
+        std::conditional_t<std::is_same_v<Counters, NoCounters> && AllPackets::bit_exact, AllPackets, NoPackets>;
+    using State = Flight<typename Triangles<I>::Frame, Query, Counters>;
+    using Layout = typename Slabs<I>::Layout;
+    using Corners = typename Layout::template Corners<I>;
 
+    // scratch: room for as many states as rays are to be in flight, aligned to 64 bytes.
     [[gnu::always_inline]] InFlight(const BvhView& bvh, const Rays& rays, const Hits& hits, const RaySource& source,
                                     PacketsOrNone& packets, std::byte* scratch)
         : bvh_(bvh),
@@ -48,11 +51,13 @@ public:
           packets_(packets),
           flights_(reinterpret_cast<State*>(scratch)) {}
 
+    // Traces the rays of the source until it is empty.
     void trace(unsigned in_flight) {
+        assert(in_flight > 1 && in_flight <= max_in_flight);
         for (unsigned i = 0; i < in_flight; ++i) {
-            start(*new (flights_ + i) State);
+            start_next_ray(*new (flights_ + i) State);
         }
-        while (ends_.node != at_node_ || ends_.leaf != at_leaf_) {
+        while (ends_.node != node_queue_ || ends_.leaf != leaf_queue_) {  // any ray is queued
             visit_nodes();
             test_leaves();
             finish_and_replace();
@@ -60,22 +65,22 @@ public:
     }
 
 private:
-    // A block some of whose triangles a flight may hit.
+    // A block some of whose triangles a ray may hit.
     struct Candidate {
         State* flight;
         const typename Layout::Block* block;
         bool last_block;
-        typename Triangles<Isa>::Found found;
+        typename Triangles<I>::Found found;
     };
 
-    // One past the last flight of each queue: flights that wait for the same kind of step stand together, so that
-    // each kind has a loop to itself and no step has to ask.
-    struct Ends {
+    // One past the last flight of each queue. Flights are queued by the kind of their next step, so that each kind has
+    // a loop of its own without branches on the kind.
+    struct QueueEnds {
         State **node, **leaf, **done;
     };
 
-    // Puts the next ray that can hit anything into a flight's place; rays that can't are answered here.
-    void start(State& f) {
+    // Starts the next ray that can hit anything, in the given flight; writes misses for the rays before it.
+    void start_next_ray(State& f) {
         for (;; ++next_) {
             do {
                 if (next_ == end_ && !source_.take(next_, end_)) {
@@ -89,20 +94,22 @@ private:
             f.query.write(hits_, next_, 1);
             f.counters.write(hits_, next_);
         }
+        assert(f.ray.is_finite());
         f.index = next_++;
-        new (&f.query) Query(query_of<Query>(f.ray, hits_, f.index));
+        new (&f.query) Query(start_query<Query>(f.ray, hits_, f.index));
         f.top = Stack::Top(f.stack);
         f.top.child() = inner_child(0);  // the root
         *ends_.node++ = &f;
     }
 
-    // The child on top is next, unless it may be hidden, which a leaf that was begun may not: prefetched now and, where
-    // nothing is left to be done before, waited for in the right queue. Written to all three, and counted in one: no
-    // branch.
-    [[gnu::always_inline]] static void wait(const BvhView& bvh, State& f, bool may_hide, bool ready, Ends& ends) {
+    // Pops entries that lie behind the best hit (may_skip is false for the rest of a leaf, which is never skipped),
+    // prefetches the new top and, if the flight is ready for its next step, appends it to the node, leaf or done queue.
+    // Branch-free: the flight is written to all three queues, and the end of one of them moves.
+    [[gnu::always_inline]] static void enqueue(const BvhView& bvh, State& f, bool may_skip, bool ready,
+                                               QueueEnds& ends) {
         Stack::Top top = f.top;
         if constexpr (Query::in_order)
-            while (may_hide & (top.distance() > f.query.interval.box_tmax())) top.move(-1);
+            while (may_skip & (top.distance() > f.query.interval.box_tmax())) top.move(-1);
         f.top = top;
         const std::uint32_t child = top.child();
         prefetch<Layout>(bvh, child);
@@ -113,75 +120,83 @@ private:
         ends.done += ready & end;
     }
 
-    // A few nodes are visited before their flights are sorted into queues: the one is without a branch, and what is
-    // guessed wrong in the other throws away little. Not all of them, though: prefetches must have something to hide
-    // behind.
+    // Visits the nodes of a few flights, which takes no branches, then enqueues those flights, which mispredicts. Small
+    // groups limit what a misprediction discards; enqueueing all flights at the end would prefetch too late.
     [[gnu::always_inline]] void visit_nodes() {
-        constexpr std::ptrdiff_t few = 8;
+        constexpr std::ptrdiff_t group_size = 8;
         const BvhView bvh = bvh_;
         State** const last = ends_.node;
-        Ends ends = {at_node_, ends_.leaf, ends_.done};  // refilled from the front, never past the flight at hand
-        for (State** i = at_node_; i != last;) {
-            State** const next = last - i < few ? last : i + few;
+        QueueEnds ends = {node_queue_, ends_.leaf, ends_.done};  // refilled from the front, behind the reading index
+        for (State** i = node_queue_; i != last;) {
+            State** const next = last - i < group_size ? last : i + group_size;
             for (State** j = i; j != next; ++j) {
                 State& f = **j;
                 Stack::Top top = f.top;
                 f.counters.inner_node();
-                visit<Query::in_order, Isa>(bvh.template node<Layout>(top.child()), Slabs<Isa>(f.ray),
-                                            f.query.interval.box_tmax(), top);
+                visit<Query::in_order, I>(bvh.template node<Layout>(top.child()), Slabs<I>(f.ray),
+                                          f.query.interval.box_tmax(), top);
                 f.top = top;
             }
-            for (; i != next; ++i) wait(bvh, **i, true, true, ends);
+            for (; i != next; ++i) enqueue(bvh, **i, true, true, ends);
         }
         ends_ = ends;
+        assert_queues_fit();
     }
 
-    // One block a turn: a leaf of several stays on top, so that the next one is prefetched, and no loop has to be left.
-    // First all blocks are asked which of their triangles may be hit; then those few are solved, one after the other
-    // without a guess whether there is anything to solve; and only then do their rays know what to do next.
+    // Tests one block per flight: the rest of its leaf stays on top of the stack, so that the next block is prefetched
+    // and the loop over the flights never waits for a leaf. First find() runs on all blocks; then solve() on the few
+    // blocks with a possible hit, without a branch on whether there is one; then their flights are enqueued, whose
+    // intervals are known only now.
     [[gnu::always_inline]] void test_leaves() {
         const BvhView bvh = bvh_;
         State** const last = ends_.leaf;
-        Ends ends = {ends_.node, at_leaf_, ends_.done};
+        QueueEnds ends = {ends_.node, leaf_queue_, ends_.done};
         Candidate* end = candidates_;
-        for (State** i = at_leaf_; i != last; ++i) {
+        for (State** i = leaf_queue_; i != last; ++i) {
             State& f = **i;
             Stack::Top top = f.top;
             const std::uint32_t child = top.child();
+            assert(!is_inner(child) && child != end_of_stack);
             const auto& block = *bvh.template leaf<Layout>(child);
             const bool last_block = leaf_block_count(child) == 1;
             f.counters.block(block);
             if (last_block) f.counters.leaf();
-            top.child() =
-                without_first_block(child, block.units());  // no matter if it was the last: above the top then
+            top.child() = without_first_block(child, block.units());  // meaningless, but popped, if it was the last
             top.move(-static_cast<std::ptrdiff_t>(last_block));
-            *end = {&f, &block, last_block, Triangles<Isa>(f.ray).find(Corners(block))};
-            const bool found = end->found.lanes != 0;
+            *end = {&f, &block, last_block, Triangles<I>(f.ray).find(Corners(block))};
+            const bool found = end->found.hit_mask != 0;
             end += found;
             f.top = top;
-            wait(bvh, f, last_block, !found, ends);
+            enqueue(bvh, f, last_block, !found, ends);
         }
         for (const Candidate* c = candidates_; c != end; ++c) {
             State& f = *c->flight;
-            if (Triangles<Isa>(f.ray).solve(Corners(*c->block), c->found, f.query)) {
+            if (Triangles<I>(f.ray).solve(Corners(*c->block), c->found, f.query)) {
                 f.top = Stack::Top(f.stack);
                 f.top.move(-1);
                 if (!c->last_block) f.counters.leaf();
             }
         }
-        for (const Candidate* c = candidates_; c != end; ++c) wait(bvh, *c->flight, c->last_block, true, ends);
+        for (const Candidate* c = candidates_; c != end; ++c) enqueue(bvh, *c->flight, c->last_block, true, ends);
         ends_ = ends;
+        assert_queues_fit();
     }
 
     [[gnu::always_inline]] void finish_and_replace() {
         State** const last = ends_.done;
-        ends_.done = done_;
-        for (State** i = done_; i != last; ++i) {
+        ends_.done = done_queue_;
+        for (State** i = done_queue_; i != last; ++i) {
             State& f = **i;
             f.query.write(hits_, f.index, f.ray.scale);
             f.counters.write(hits_, f.index);
-            start(f);
+            start_next_ray(f);
         }
+    }
+
+    [[gnu::always_inline]] void assert_queues_fit() const {
+        assert(ends_.node - node_queue_ <= max_in_flight);
+        assert(ends_.leaf - leaf_queue_ <= max_in_flight);
+        assert(ends_.done - done_queue_ <= max_in_flight);
     }
 
     const BvhView bvh_;
@@ -190,19 +205,29 @@ private:
     const RaySource source_;
     PacketsOrNone& packets_;
     State* flights_;
-    State *at_node_[max_in_flight + 1], *at_leaf_[max_in_flight + 1], *done_[max_in_flight + 1];
+    // One more than the flights, because entries are also written past the ends.
+    State *node_queue_[max_in_flight + 1], *leaf_queue_[max_in_flight + 1], *done_queue_[max_in_flight + 1];
     Candidate candidates_[max_in_flight + 1];
-    Ends ends_ = {at_node_, at_leaf_, done_};
-    std::size_t next_ = 0, end_ = 0;
+    QueueEnds ends_ = {node_queue_, leaf_queue_, done_queue_};
+    std::size_t next_ = 0, end_ = 0;  // rays of the source that this thread has taken and not yet started
 };
 
-template <class Isa, template <class> class Slabs, template <class> class Triangles, class Query, class Counters>
-void trace_batch(const BvhView& bvh, const RayBatch<typename Isa::Real>& rays, const HitBatch<typename Isa::Real>& hits,
+// A kernel: traces the rays of a source with so many rays in flight, one by one if in_flight is 1. Checks the types
+// that it is made of, each with a message of its own.
+template <class I, template <class> class Slabs, template <class> class Triangles, class Query, class Counters>
+void trace_batch(const BvhView& bvh, const RayBatch<typename I::Real>& rays, const HitBatch<typename I::Real>& hits,
                  const RaySource& source, unsigned in_flight, std::byte* scratch) {
+    using Corners = typename Slabs<I>::Layout::template Corners<I>;
+    static_assert(Isa<I>, "I lacks an operation of an instruction set, see Isa in traverse/concepts.h");
+    static_assert(NodeLayout<typename Slabs<I>::Layout, I>, "Slabs<I>::Layout must be a NodeLayout, see concepts.h");
+    static_assert(SlabTest<Slabs<I>, I>, "Slabs<I> must be a SlabTest, see traverse/concepts.h");
+    static_assert(RayQuery<Query, typename I::Real>, "Query must be a RayQuery, see traverse/concepts.h");
+    static_assert(TriangleTest<Triangles<I>, Corners, Query>, "Triangles<I> must be a TriangleTest, see concepts.h");
+    static_assert(StepCounter<Counters>, "Counters must be StepCounters or NoCounters, see traverse/counters.h");
     if (in_flight <= 1) {
-        trace_one_by_one<Isa, Slabs, Triangles, Query, Counters>(bvh, rays, hits, source);
+        trace_one_by_one<I, Slabs, Triangles, Query, Counters>(bvh, rays, hits, source);
     } else {
-        using Flights = InFlight<Isa, Slabs, Triangles, typename Query::InFlight, Counters>;
+        using Flights = InFlight<I, Slabs, Triangles, typename Query::InFlight, Counters>;
         typename Flights::PacketsOrNone packets(bvh, rays, hits, in_flight);
         Flights(bvh, rays, hits, source, packets, scratch).trace(in_flight);
     }

@@ -1,11 +1,13 @@
-// Rays that go together: neighbours in the batch, close to each other and in much the same direction.
+// Packets of coherent rays: neighbours in the batch with close origins and similar directions.
 //
-// Such rays meet the same nodes. One walk through the tree visits what any of them may meet (packet_slabs.h), for the
-// price of one ray or two; at each leaf, the rays that meet its box are found eight at a time, and each of them is
-// tested as it is when it is alone. Where boxes lie in their parents' boxes, a ray that meets a leaf's has met all
-// above it: every ray comes to the leaves that it comes to alone, in the same order, and its hits are the same bits.
+// Coherent rays visit the same nodes. One walk through the tree visits the nodes that any ray of the packet may meet
+// (packet_slabs.h), at the cost of one or two rays. At a leaf, the rays that meet its box are found eight at a time,
+// and each of them is tested as a single ray is. If boxes lie within their parents' boxes, a ray that meets a leaf's
+// box meets all boxes above it: every ray is tested against the same leaves in the same order as in single-ray
+// traversal, and its hits are the same bits.
 #pragma once
 
+#include <cassert>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
@@ -16,58 +18,61 @@
 
 namespace wive {
 
-template <class Isa, template <class> class Slabs, template <class> class Triangles, class Query>
+template <Isa I, template <class> class Slabs, template <class> class Triangles, class Query>
+    requires Traversable<I, Slabs, Triangles, Query>
 class Packet {
-    using Real = typename Isa::Real;
-    using Real4 = typename Isa::Real4;
-    using Float4 = typename Isa::Float4;
-    using Float8 = typename Isa::Float8;
+    using Real = typename I::Real;
+    using Real4 = typename I::Real4;
+    using Float4 = typename I::Float4;
+    using Float8 = typename I::Float8;
     using Rays = RayBatch<Real>;
     using Hits = HitBatch<Real>;
-    using Layout = typename Slabs<Isa>::Layout;
+    using Layout = typename Slabs<I>::Layout;
     using Node = typename Layout::Node;
     using Block = typename Layout::Block;
-    using Corners = typename Layout::template Corners<Isa>;
-    using Frame = typename Triangles<Isa>::Frame;
+    using Corners = typename Layout::template Corners<I>;
+    using Frame = typename Triangles<I>::Frame;
 
 public:
-    static constexpr unsigned width = 16;
-    // Else a ray might come to a leaf that it does not come to alone, and accept what lies outside its box.
-    static constexpr bool bit_exact = Layout::boxes_are_nested || Triangles<Isa>::hits_are_in_boxes;
+    static constexpr unsigned packet_size = 16;
+    // Packets give the single ray's bits only if boxes nest or the triangle test accepts no hit outside its leaf's box:
+    // otherwise a packet might reach a leaf that the single ray skips, and accept a hit there.
+    static constexpr bool bit_exact = Layout::boxes_are_nested || Triangles<I>::hits_are_in_boxes;
 
     enum class Outcome { refused, worthwhile, not_worthwhile };
 
     Packet(const BvhView& bvh, const Rays& rays, const Hits& hits) : bvh_(bvh), rays_(rays), hits_(hits) {}
 
-    // Answers rays [first, first + width), or refuses to where they don't go together.
+    // Traces rays [first, first + packet_size) and writes their hits, or refuses to if they are not coherent.
     [[gnu::noinline]] Outcome trace(std::size_t first) {
-        if (!go_together(first, width - 1) || !go_together(first, 1) || !load(first)) return Outcome::refused;
-        walk_together();
-        for (unsigned i = 0; i < width; ++i) query_[i].write(hits_, first + i, ray_[i].scale);
-        return rays_at_leaves_ >= fewest_rays_a_leaf * leaves_ ? Outcome::worthwhile : Outcome::not_worthwhile;
+        if (!are_coherent(first, packet_size - 1) || !are_coherent(first, 1) || !load(first)) return Outcome::refused;
+        walk_packet();
+        for (unsigned i = 0; i < packet_size; ++i) query_[i].write(hits_, first + i, ray_[i].scale);
+        return rays_at_leaves_ >= worthwhile_rays_per_leaf * leaves_ ? Outcome::worthwhile : Outcome::not_worthwhile;
     }
 
 private:
-    // Of a leaf that the packet comes to: with fewer, rays in flight are faster.
-    static constexpr unsigned fewest_rays_a_leaf = 2;
+    // Rays that meet the box of a leaf the packet visits, on average; with fewer, rays in flight are faster.
+    static constexpr unsigned worthwhile_rays_per_leaf = 2;
 
-    // How far the rays' directions may differ, in their longest component, and their origins, in the tree's extent.
-    static constexpr float most_turn = 1.0f / 8, most_shift = 1.0f / 16;
+    // The largest difference between the rays' directions, relative to their longest component, and between their
+    // origins, relative to the tree's extent.
+    static constexpr float max_turn = 1.0f / 8, max_shift = 1.0f / 16;
 
-    // A triangle block some of whose triangles a ray may hit.
+    // A ray that may hit some of a block's triangles.
     struct Candidate {
         unsigned ray;
-        typename Triangles<Isa>::Found found;
+        typename Triangles<I>::Found found;
     };
 
-    // Of every step-th ray. What is no number is left to load().
-    bool go_together(std::size_t first, unsigned step) const {
+    // Compares every step-th ray. NaN and infinity are left to load().
+    bool are_coherent(std::size_t first, unsigned step) const {
         const auto vector = [](const Real* p, std::size_t i) {
             return Real4::set(p[3 * i], p[3 * i + 1], p[3 * i + 2], 0);
         };
         Real4 low_origin = vector(rays_.origins, first), high_origin = low_origin;
         Real4 low_direction = vector(rays_.directions, first), high_direction = low_direction;
-        for (std::size_t i = first + step; i < first + width; i += step) {
+        for (std::size_t i = first + step; i < first + packet_size; i += step) {
             const Real4 origin = vector(rays_.origins, i), direction = vector(rays_.directions, i);
             low_origin = min(low_origin, origin);
             high_origin = max(high_origin, origin);
@@ -76,19 +81,20 @@ private:
         }
         const Real longest = highest_lane(max(abs(low_direction), abs(high_direction)));
         const float extent = highest_lane(Float4::load(bvh_.extent));
-        return (highest_lane(high_direction - low_direction) <= most_turn * longest) &
-               (highest_lane(high_origin - low_origin) <= most_shift * extent);
+        return (highest_lane(high_direction - low_direction) <= max_turn * longest) &
+               (highest_lane(high_origin - low_origin) <= max_shift * extent);
     }
 
-    // False where a ray hits nothing by rule, or its octant is another's; or its scale, which would make the bounds
-    // loose.
+    // Returns false if a ray hits nothing by rule, or if the rays differ in octant or in scale, which would make the
+    // bounds loose.
     bool load(std::size_t first) {
         Float4 low_rdir{}, high_rdir{}, low_origin{}, high_origin{};
         bounds_.tmin = std::numeric_limits<float>::infinity();
-        for (unsigned i = 0; i < width; ++i) {
+        for (unsigned i = 0; i < packet_size; ++i) {
             Frame& ray = ray_[i];
             if (!ray.load(bvh_, rays_, first + i)) return false;
             if ((ray.order_shift != ray_[0].order_shift) | (ray.scale != ray_[0].scale)) return false;
+            assert(ray.is_finite());
             const Float4 rdir = Float4::load(ray.rdir);
             const Float4 origin = Float4::narrow(Real4::load(ray.origin) - Real4::of(Float4::load(bvh_.center)));
             low_rdir = i == 0 ? rdir : min(low_rdir, rdir);
@@ -101,18 +107,18 @@ private:
                 far_bias_[axis][i] = ray.far_bias[axis];
             }
             tmin_[i] = ray.interval.box_tmin();
-            reach_[i] = ray.interval.box_tmax();
+            tmax_[i] = ray.interval.box_tmax();
             bounds_.tmin = tmin_[i] < bounds_.tmin ? tmin_[i] : bounds_.tmin;
-            new (&query_[i]) Query(query_of<Query>(ray, hits_, first + i));
+            new (&query_[i]) Query(start_query<Query>(ray, hits_, first + i));
         }
         set_bounds(low_rdir, high_rdir, low_origin, high_origin, Float4::load(bvh_.extent));
         return true;
     }
 
     void set_bounds(Float4 low_rdir, Float4 high_rdir, Float4 low_origin, Float4 high_origin, Float4 extent) {
-        constexpr float least_reach = 0x1p-100f, slack_factor = 0x1p-18f;  // 64u; as in frame.h, u = 2^-24
-        const float reach = highest_lane(extent + max(abs(low_origin), abs(high_origin))) + least_reach;
-        const Float4 slack = Float4::all(reach * slack_factor);
+        constexpr float least_magnitude = 0x1p-100f, slack_factor = 0x1p-18f;  // 64u; as in frame.h, u = 2^-24
+        const float magnitude = highest_lane(extent + max(abs(low_origin), abs(high_origin))) + least_magnitude;
+        const Float4 slack = Float4::all(magnitude * slack_factor);
         alignas(16) float rdir[2][4], behind[4], ahead[4];
         low_rdir.store(rdir[0]);
         high_rdir.store(rdir[1]);
@@ -120,8 +126,8 @@ private:
         (high_origin + slack).store(ahead);
         for (unsigned axis = 0; axis < 3; ++axis) {
             const bool negative = rdir[0][axis] < 0;
-            bounds_.near_from[axis] = negative ? behind[axis] : ahead[axis];
-            bounds_.far_from[axis] = negative ? ahead[axis] : behind[axis];
+            bounds_.near_origin[axis] = negative ? behind[axis] : ahead[axis];
+            bounds_.far_origin[axis] = negative ? ahead[axis] : behind[axis];
             for (unsigned end = 0; end < 2; ++end) bounds_.rdir[end][axis] = rdir[end][axis];
             bounds_.near_row[axis] = ray_[0].near_row[axis];
             bounds_.far_row[axis] = ray_[0].far_row[axis];
@@ -129,19 +135,19 @@ private:
         bounds_.order_shift = ray_[0].order_shift;
     }
 
-    [[gnu::noinline]] void walk_together() {
+    [[gnu::noinline]] void walk_packet() {
         leaves_ = rays_at_leaves_ = 0;
-        float reach = farthest_reach();
-        // A leaf's box stands in its parent. The children that a node leaves on the stack have its place beside them.
-        const auto place = [&](const Stack::Top& top) { return parents_ + (&top.distance() - stack_.distances); };
-        walk<Query::in_order, Isa>(
-            bvh_, PacketSlabs<Isa, Layout>(bounds_), stack_, [&] { return reach; },
+        float box_tmax = farthest_tmax();
+        // A leaf's box is in its parent, so each entry of the stack has its parent beside it, at the same index.
+        const auto parent_at = [&](const Stack::Top& top) { return parents_ + (&top.distance() - stack_.distances); };
+        walk<Query::in_order, I>(
+            bvh_, PacketSlabs<I, Layout>(bounds_), stack_, [&] { return box_tmax; },
             [&](std::uint32_t child, const Stack::Top& top) {
-                for (int i = 0; i < node_width; ++i) place(top)[i] = child;
+                for (int i = 0; i < node_width; ++i) parent_at(top)[i] = child;
             },
             [&](std::uint32_t child, const Stack::Top& top) {
-                const Node& parent = bvh_.template node<Layout>(*place(top));
-                unsigned rays = rays_at(parent, Isa::Hits::of_child(parent.child, child).first());
+                const Node& parent = bvh_.template node<Layout>(*parent_at(top));
+                unsigned rays = rays_meeting_box(parent, I::Hits::of_child(parent.child, child).first());
                 ++leaves_;
                 rays_at_leaves_ += static_cast<unsigned>(__builtin_popcount(rays));
                 const Block* block = bvh_.template leaf<Layout>(child);
@@ -149,101 +155,105 @@ private:
                 for (std::uint32_t count = leaf_block_count(child); rays != 0 && count > 0;
                      --count, block = block->next())
                     found |= test_block(*block, rays);
-                if (found) reach = farthest_reach();
-                return reach == done;
+                if (found) box_tmax = farthest_tmax();
+                return box_tmax == finished;
             });
     }
 
-    // Those that meet the box of one of a node's children, lane 0 lowest.
-    [[gnu::always_inline]] unsigned rays_at(const Node& node, unsigned lane) const {
+    // The mask of the rays that meet the box in a lane of a node.
+    [[gnu::always_inline]] unsigned rays_meeting_box(const Node& node, unsigned lane) const {
+        assert(lane < node_width);
         const OneChild<Float8> child{lane};
         unsigned rays = 0;
-        for (unsigned i = 0; i < width; i += node_width) {
+        for (unsigned i = 0; i < packet_size; i += node_width) {
             const auto distance = [&](std::size_t row, unsigned axis, const float* bias) {
                 return Layout::distance(node, child, row, axis, Float8::load(rdir_[axis] + i), Float8::load(bias + i));
             };
-            const auto meets = intersect_boxes<Isa>(
+            const auto boxes = intersect_boxes<I>(
                 [&](unsigned axis) { return distance(bounds_.near_row[axis], axis, near_bias_[axis]); },
                 [&](unsigned axis) { return distance(bounds_.far_row[axis], axis, far_bias_[axis]); },
-                Float8::load(tmin_ + i), Float8::load(reach_ + i));
-            rays |= meets.hit.bits() << i;
+                Float8::load(tmin_ + i), Float8::load(tmax_ + i));
+            rays |= boxes.hit.bits() << i;
         }
         return rays;
     }
 
-    // As rays in flight do: first all are asked, then those few that may hit anything are solved. True if there were
-    // any; those that ask nothing more are taken out of the rays.
+    // Tests the given rays, as test_leaves() in in_flight.h does: first find() for all, then solve() for the few that
+    // may hit a triangle. Returns whether there were any, and clears the bits of rays whose query is done.
     [[gnu::always_inline]] bool test_block(const Block& block, unsigned& rays) {
         const Corners corners(block);
         Candidate* end = candidates_;
         for (unsigned left = rays; left != 0; left &= left - 1) {
             const auto i = static_cast<unsigned>(__builtin_ctz(left));
-            *end = {i, Triangles<Isa>(ray_[i]).find(corners)};
-            end += end->found.lanes != 0;
+            *end = {i, Triangles<I>(ray_[i]).find(corners)};
+            end += end->found.hit_mask != 0;
         }
         for (const Candidate* c = candidates_; c != end; ++c) {
-            const bool ends = Triangles<Isa>(ray_[c->ray]).solve(corners, c->found, query_[c->ray]);
-            reach_[c->ray] = ends ? done : query_[c->ray].interval.box_tmax();
-            rays &= ~(static_cast<unsigned>(ends) << c->ray);
+            const bool done = Triangles<I>(ray_[c->ray]).solve(corners, c->found, query_[c->ray]);
+            tmax_[c->ray] = done ? finished : query_[c->ray].interval.box_tmax();
+            rays &= ~(static_cast<unsigned>(done) << c->ray);
         }
         return end != candidates_;
     }
 
-    float farthest_reach() const {
-        Float8 farthest = Float8::load(reach_);
-        for (unsigned i = node_width; i < width; i += node_width) farthest = max(farthest, Float8::load(reach_ + i));
+    float farthest_tmax() const {
+        Float8 farthest = Float8::load(tmax_);
+        for (unsigned i = node_width; i < packet_size; i += node_width)
+            farthest = max(farthest, Float8::load(tmax_ + i));
         return highest_lane(farthest);
     }
 
-    static constexpr float done = -std::numeric_limits<float>::infinity();  // the reach of a ray that asks nothing more
+    static constexpr float finished = -std::numeric_limits<float>::infinity();  // tmax of a ray whose query is done
 
     const BvhView bvh_;
     const Rays rays_;
     const Hits hits_;
-    alignas(64) float rdir_[3][width], near_bias_[3][width], far_bias_[3][width], tmin_[width], reach_[width];
+    alignas(64) float rdir_[3][packet_size],
+        near_bias_[3][packet_size], far_bias_[3][packet_size], tmin_[packet_size], tmax_[packet_size];
     PacketBounds bounds_;
     unsigned leaves_ = 0, rays_at_leaves_ = 0;
-    Frame ray_[width];
-    Query query_[width];
-    Candidate candidates_[width + 1];
+    Frame ray_[packet_size];
+    Query query_[packet_size];
+    Candidate candidates_[packet_size + 1];
     Stack stack_;
     std::uint32_t parents_[Stack::size];
 };
 
-// The packets of one thread's share of a batch.
-template <class Isa, template <class> class Slabs, template <class> class Triangles, class Query>
+// Decides which rays of a thread are traced in packets.
+template <Isa I, template <class> class Slabs, template <class> class Triangles, class Query>
 class Packets {
-    using Together = Packet<Isa, Slabs, Triangles, Query>;
+    using OnePacket = Packet<I, Slabs, Triangles, Query>;
 
 public:
-    static constexpr bool bit_exact = Together::bit_exact;
+    static constexpr bool bit_exact = OnePacket::bit_exact;
 
     // With fewer rays in flight than a packet has, there are none.
     Packets(const BvhView& bvh, const auto& rays, const auto& hits, unsigned in_flight)
-        : next_try_(in_flight < Together::width ? std::numeric_limits<std::size_t>::max() : 0),
+        : next_try_(in_flight < OnePacket::packet_size ? std::numeric_limits<std::size_t>::max() : 0),
           packet_(bvh, rays, hits) {}
 
-    // Answers rays from `next` on if enough of them go together, and moves next past them; true then. Where they don't,
-    // or it did not pay, more and more of the rays behind are let pass before it is tried again.
+    // Traces the rays from `next` on as a packet if there are enough and they are coherent; returns true then, with
+    // `next` moved past them. After a packet that was refused or not worthwhile, more and more rays are skipped before
+    // the next attempt.
     [[gnu::always_inline]] bool trace_next(std::size_t& next, std::size_t end) {
-        if (next < next_try_ || end - next < Together::width) return false;
+        if (next < next_try_ || end - next < OnePacket::packet_size) return false;
         const auto outcome = packet_.trace(next);
-        const bool answered = outcome != Together::Outcome::refused;
-        if (answered) next += Together::width;
-        if (outcome == Together::Outcome::worthwhile) {
+        const bool traced = outcome != OnePacket::Outcome::refused;
+        if (traced) next += OnePacket::packet_size;
+        if (outcome == OnePacket::Outcome::worthwhile) {
             pause_ = 0;
         } else {
             next_try_ = next + pause_;
-            pause_ = pause_ < longest_pause ? 2 * pause_ + Together::width : longest_pause;
+            pause_ = pause_ < longest_pause ? 2 * pause_ + OnePacket::packet_size : longest_pause;
         }
-        return answered;
+        return traced;
     }
 
 private:
     static constexpr std::size_t longest_pause = 496;  // 16, 48, 112, 240, 496
 
     std::size_t next_try_, pause_ = 0;  // in rays
-    Together packet_;
+    OnePacket packet_;
 };
 
 struct NoPackets {

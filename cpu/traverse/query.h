@@ -1,31 +1,31 @@
-// What a query keeps of the hits it is offered.
+// Queries for one hit per ray: what is kept of the hits that triangle tests offer.
 #pragma once
 
 #include <bit>
+#include <cassert>
 #include <cstring>
 #include <limits>
 #include <type_traits>
 
 #include "core/interval.h"
 #include "core/ray.h"
+#include "traverse/concepts.h"
 
 namespace wive {
 
-// Every query has in_order: whether children are met from front to back, and perturb_edges: whether the number of its
-// hits matters, so that a ray must not pass a surface twice where two triangles meet.
-
-// Queries of rays in flight are InFlight ones, where that is another way of the same: a branch that is predicted wrong
-// throws away what has been begun for the rays behind. A ray on its own has nothing else to do but to guess.
+// Query::InFlight is the variant for rays in flight, branch-free if that differs: there a misprediction also discards
+// work already issued for other rays. For a single ray the branch is faster.
 
 // A hit as four words side by side.
 template <class Real>
-struct alignas(4 * sizeof(Real)) Nearest {
+struct alignas(4 * sizeof(Real)) HitWords {
     using Word = std::conditional_t<sizeof(Real) == sizeof(float), std::uint32_t, std::uint64_t>;
 
     Real t, u, v;
     Word prim;
 
-    // Becomes that hit where it is better: no branch. Returns t, which need not be looked up again.
+    // Replaces this hit by another if that is better, without a branch. Returns the t that is kept, so that it need not
+    // be loaded again.
     [[gnu::always_inline]] Real replace_if(bool better, Real hit_t, Real hit_u, Real hit_v, Word hit_prim) {
         typedef Word Words __attribute__((vector_size(4 * sizeof(Word))));
         const Words hit = {std::bit_cast<Word>(hit_t), std::bit_cast<Word>(hit_u), std::bit_cast<Word>(hit_v),
@@ -39,16 +39,15 @@ struct alignas(4 * sizeof(Real)) Nearest {
     }
 };
 
-// The nearest hit in [tmin, tmax]; of hits at the same t, the lowest prim, whatever order they are found in.
+// The closest hit in [tmin, tmax]; among hits at the same t the lowest prim, in whatever order they are found.
 template <class Real, bool in_flight = false>
 struct ClosestHit {
     using InFlight = ClosestHit<Real, true>;
-    // Children are met from front to back and kept with their distances, because tmax falls with every hit found.
     static constexpr bool in_order = true;
     static constexpr bool perturb_edges = false;
 
     Interval<Real> interval;  // ends at the best hit
-    Nearest<Real> best;
+    HitWords<Real> best;
 
     [[gnu::always_inline]] ClosestHit(Interval<Real> given = {}) : interval(given), best{given.tmax, 0, 0, no_prim} {}
 
@@ -78,8 +77,7 @@ struct ClosestHit {
 template <class Real>
 struct AnyHit {
     using InFlight = AnyHit;
-    // Any hit ends the query, so children are taken as they stand: cheaper, and fewer steps as well.
-    static constexpr bool in_order = false;
+    static constexpr bool in_order = false;  // cheaper, and fewer steps: the builder puts likely occluders last
     static constexpr bool perturb_edges = false;
 
     Interval<Real> interval{};
@@ -89,18 +87,19 @@ struct AnyHit {
         hit = interval.holds(t);
         return hit;
     }
-    // A hit that is known to lie within, t in the caller's units, as exact mode has it.
+    // Takes a hit that is known to lie in the interval; exact tests call this, with t in the caller's units.
     static constexpr bool wants_uv = false;
-    [[gnu::always_inline]] bool take(Real, Real, Real, std::uint32_t) { return hit = true; }
+    [[gnu::always_inline]] bool accept(Real, Real, Real, std::uint32_t) { return hit = true; }
     [[gnu::always_inline]] void write(const HitBatch<Real>& hits, std::size_t i, Real) const { hits.occluded[i] = hit; }
 };
 
-// Offers the hits in some lanes of a block; true once the query is done.
-template <class Block, class Real, class Query>
-[[gnu::always_inline]] inline bool offer_lanes(const Block& block, unsigned lanes, const Real (&ts)[4],
+// Offers the hits in the lanes of a mask; true once the query is done.
+template <class Block, class Real, OfferedQuery<Real> Query>
+[[gnu::always_inline]] inline bool offer_lanes(const Block& block, unsigned hit_mask, const Real (&ts)[4],
                                                const Real (&us)[4], const Real (&vs)[4], Query& query) {
-    for (; lanes != 0; lanes &= lanes - 1) {
-        const int lane = __builtin_ctz(lanes);
+    for (; hit_mask != 0; hit_mask &= hit_mask - 1) {
+        const int lane = __builtin_ctz(hit_mask);
+        assert(lane < block_width && block.prim_at(lane) >= 0);
         if (query.offer(ts[lane], us[lane], vs[lane], static_cast<std::uint32_t>(block.prim_at(lane)))) return true;
     }
     return false;

@@ -1,4 +1,4 @@
-// What queries for everything along a ray keep of the hits they are offered.
+// Queries for every hit along a ray: what is kept of the hits that triangle tests offer.
 #pragma once
 
 #include "core/interval.h"
@@ -7,12 +7,12 @@
 
 namespace wive {
 
-// How many triangles a ray meets in [tmin, tmax].
+// The number of triangles hit in [tmin, tmax].
 template <class Real>
 struct CountHits {
     using InFlight = CountHits;
-    static constexpr bool in_order = false;      // all are wanted, whichever comes first
-    static constexpr bool perturb_edges = true;  // how often a ray passes a surface must come out right
+    static constexpr bool in_order = false;  // every hit is wanted, and none ends the interval
+    static constexpr bool perturb_edges = true;
 
     Interval<Real> interval{};
     std::int32_t count = 0;
@@ -21,16 +21,16 @@ struct CountHits {
         count += interval.holds(t);
         return false;
     }
-    // A hit that is known to lie within, t in the caller's units, as exact mode has it.
+    // Takes a hit that is known to lie in the interval; exact tests call this, with t in the caller's units.
     static constexpr bool wants_uv = false;
-    [[gnu::always_inline]] bool take(Real, Real, Real, std::uint32_t) {
+    [[gnu::always_inline]] bool accept(Real, Real, Real, std::uint32_t) {
         ++count;
         return false;
     }
     [[gnu::always_inline]] void write(const HitBatch<Real>& hits, std::size_t i, Real) const { hits.count[i] = count; }
 };
 
-// Each of them, added to the thread's list.
+// Every hit in [tmin, tmax], appended to the thread's list, and their number.
 template <class Real>
 struct AllHits {
     using InFlight = AllHits;
@@ -51,7 +51,7 @@ struct AllHits {
         return false;
     }
     static constexpr bool wants_uv = true;
-    [[gnu::always_inline]] bool take(Real t, Real u, Real v, std::uint32_t prim) {
+    [[gnu::always_inline]] bool accept(Real t, Real u, Real v, std::uint32_t prim) {
         found->add({ray, t, u, v, static_cast<std::int32_t>(prim)});
         ++count;
         return false;

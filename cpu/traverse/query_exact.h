@@ -7,8 +7,8 @@
 
 namespace wive {
 
-// Every hit is offered with its t as the caller counts it, the nearest float to the exact value. Rounding keeps the
-// order of what it does not make equal; what it does is compared exactly, so the best hit's triangle is remembered.
+// t is in the caller's units, the float nearest to the exact value. Rounding preserves order except for making unequal
+// values equal, so equal floats are compared exactly, and the best hit's triangle is remembered for that.
 template <class Block>
 struct ExactClosestHit {
     using InFlight = ExactClosestHit;
@@ -17,16 +17,16 @@ struct ExactClosestHit {
     static constexpr bool wants_uv = true;
 
     Interval<float> interval{};  // for the boxes, in the frame's units; ends at the best hit
-    HitNumbers best{std::numeric_limits<float>::infinity(), 0, 0};
+    RoundedHit best{std::numeric_limits<float>::infinity(), 0, 0};
     std::uint32_t prim = no_prim;
     const Block* block = nullptr;
     int lane = 0;
 
-    // compare(block, lane): the sign of the exact t offered less that of another triangle. unscale: t in the
-    // frame's units over the caller's.
+    // Takes a hit that is known to lie in the caller's interval. compare(block, lane): the sign of the exact t of this
+    // hit less that of another triangle. unscale: t in the frame's units / t in the caller's.
     template <class Compare>
-    [[gnu::always_inline]] bool take(const HitNumbers& hit, const Block& hit_block, int hit_lane, float unscale,
-                                     const Compare& compare) {
+    [[gnu::always_inline]] bool accept(const RoundedHit& hit, const Block& hit_block, int hit_lane, float unscale,
+                                       const Compare& compare) {
         const auto hit_prim = static_cast<std::uint32_t>(hit_block.prim_at(hit_lane));
         if (prim != no_prim) {
             if (hit.t > best.t) return false;
@@ -39,7 +39,7 @@ struct ExactClosestHit {
         prim = hit_prim;
         block = &hit_block;
         lane = hit_lane;
-        // Boxes are lowered by more than t was rounded (frame.h), except where t is a subnormal number.
+        // The slack of the boxes (frame.h) is larger than the rounding of t, unless t is subnormal.
         interval.end_at((hit.t + 0x1p-148f) * unscale);
         return false;
     }

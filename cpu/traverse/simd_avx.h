@@ -1,5 +1,5 @@
-// Four and eight floats and four doubles: what the AVX2 and the AVX-512 files share. Every function is always inlined,
-// so no copy compiled for one instruction set can be linked into another.
+// Vectors of four and eight floats and of four doubles, for AVX2 and AVX-512; concepts.h says what each function does.
+// Every function is always inlined, so that no copy compiled for one instruction set can be linked into another.
 #pragma once
 
 #include <immintrin.h>
@@ -35,7 +35,6 @@ struct AvxDouble4 {
     WIVE_INLINE friend unsigned less_equal(AvxDouble4 a, AvxDouble4 b) {
         return static_cast<unsigned>(_mm256_movemask_pd(_mm256_cmp_pd(a.v, b.v, _CMP_LE_OQ)));
     }
-    // These as for SseFloat4.
     WIVE_INLINE friend double highest_lane(AvxDouble4 a) {
         const __m128d pairs = _mm_max_pd(_mm256_castpd256_pd128(a.v), _mm256_extractf128_pd(a.v, 1));
         return _mm_cvtsd_f64(_mm_max_sd(pairs, _mm_unpackhi_pd(pairs, pairs)));
@@ -70,12 +69,10 @@ struct SseFloat4 {
     WIVE_INLINE friend SseFloat4 min(SseFloat4 a, SseFloat4 b) { return {_mm_min_ps(a.v, b.v)}; }
     WIVE_INLINE friend SseFloat4 max(SseFloat4 a, SseFloat4 b) { return {_mm_max_ps(a.v, b.v)}; }
     WIVE_INLINE friend SseFloat4 abs(SseFloat4 a) { return {_mm_andnot_ps(_mm_set1_ps(-0.0f), a.v)}; }
-    // a with its sign flipped where s is negative
     WIVE_INLINE friend SseFloat4 flip_sign(SseFloat4 a, SseFloat4 s) {
         return {_mm_xor_ps(a.v, _mm_and_ps(_mm_set1_ps(-0.0f), s.v))};
     }
     WIVE_INLINE friend AvxDouble4 widen(SseFloat4 a) { return {_mm256_cvtps_pd(a.v)}; }
-    // From either precision: to float, and to this one.
     WIVE_INLINE static SseFloat4 narrow(AvxDouble4 a) { return {_mm256_cvtpd_ps(a.v)}; }
     WIVE_INLINE static SseFloat4 narrow(SseFloat4 a) { return a; }
     WIVE_INLINE static SseFloat4 of(SseFloat4 a) { return a; }
@@ -84,14 +81,12 @@ struct SseFloat4 {
         return _mm_cvtss_f32(_mm_max_ss(pairs, _mm_movehdup_ps(pairs)));
     }
     WIVE_INLINE friend unsigned sign_bits(SseFloat4 a) { return static_cast<unsigned>(_mm_movemask_ps(a.v)); }
-    // Lane masks as bits, lane 0 lowest. A comparison with NaN is false.
     WIVE_INLINE friend unsigned less_equal(SseFloat4 a, SseFloat4 b) {
         return static_cast<unsigned>(_mm_movemask_ps(_mm_cmp_ps(a.v, b.v, _CMP_LE_OQ)));
     }
     WIVE_INLINE friend unsigned less(SseFloat4 a, SseFloat4 b) {
         return static_cast<unsigned>(_mm_movemask_ps(_mm_cmp_ps(a.v, b.v, _CMP_LT_OQ)));
     }
-    // Lanes where a <= b, c <= d and e < f.
     WIVE_INLINE friend unsigned all_in_order(SseFloat4 a, SseFloat4 b, SseFloat4 c, SseFloat4 d, SseFloat4 e,
                                              SseFloat4 f) {
         const __m128 ab = _mm_cmp_ps(a.v, b.v, _CMP_LE_OQ), cd = _mm_cmp_ps(c.v, d.v, _CMP_LE_OQ);
@@ -100,7 +95,6 @@ struct SseFloat4 {
     WIVE_INLINE friend unsigned equal(SseFloat4 a, SseFloat4 b) {
         return static_cast<unsigned>(_mm_movemask_ps(_mm_cmp_ps(a.v, b.v, _CMP_EQ_OQ)));
     }
-    // Lanes where low >= 0 or high <= 0.
     WIVE_INLINE friend unsigned one_sided(SseFloat4 low, SseFloat4 high) {
         const __m128 zero = _mm_setzero_ps();
         return static_cast<unsigned>(
@@ -110,16 +104,13 @@ struct SseFloat4 {
 
 WIVE_INLINE AvxDouble4 AvxDouble4::of(SseFloat4 a) { return widen(a); }
 
-// Which of eight lanes were hit, as a vector of all-ones and all-zeros.
+// Which of eight lanes were hit: all bits of a lane are 1 if it was, else 0.
 struct AvxHits {
     __m256 v;
-    // Lane 0 lowest.
     WIVE_INLINE unsigned bits() const { return static_cast<unsigned>(_mm256_movemask_ps(v)); }
     WIVE_INLINE unsigned count() const { return static_cast<unsigned>(_mm_popcnt_u32(bits())); }
-    // The lowest and the highest lane, of at least one.
     WIVE_INLINE unsigned first() const { return _tzcnt_u32(bits()); }
     WIVE_INLINE unsigned last() const { return 31 - _lzcnt_u32(bits()); }
-    // The lanes of a node that hold this child; of all lanes if it is end_of_stack, the empty ones.
     WIVE_INLINE static AvxHits of_child(const std::uint32_t* row, std::uint32_t child) {
         const __m256i children = _mm256_load_si256(reinterpret_cast<const __m256i*>(row));
         return {_mm256_castsi256_ps(_mm256_cmpeq_epi32(children, _mm256_set1_epi32(static_cast<int>(child))))};
@@ -149,13 +140,14 @@ struct AvxFloat8 {
     }
 };
 
-// Slots in an octant's order. A permute reads the low three bits of an index, so nothing need be masked.
+// Slots in an octant's order, each in the low three bits of a lane. A permute reads no other bits, so the bits of other
+// octants above them need not be masked off.
 struct AvxOrder {
     __m256i slots;
     WIVE_INLINE AvxOrder(const std::uint32_t* row, unsigned shift)
         : slots(_mm256_srl_epi32(_mm256_load_si256(reinterpret_cast<const __m256i*>(row)),
                                  _mm_cvtsi32_si128(static_cast<int>(shift)))) {}
-    // Of lanes of three bytes. The last load reads four bytes past them.
+    // From lanes of three bytes. The last load reads four bytes past the row.
     WIVE_INLINE AvxOrder(const std::uint8_t (*row)[3], unsigned shift) {
         const auto four_lanes = [&](int lane) { return _mm_loadu_si128(reinterpret_cast<const __m128i*>(row + lane)); };
         const __m256i bytes = _mm256_inserti128_si256(_mm256_castsi128_si256(four_lanes(0)), four_lanes(4), 1);
@@ -165,7 +157,7 @@ struct AvxOrder {
     }
 };
 
-// Four of the first eight floats from an address, chosen by four bits each: those of `word` from bit `shift` on.
+// Chooses four of the eight floats at an address, by four bits each of `word` from bit `shift` on.
 struct AvxPick {
     __m128i index;
     WIVE_INLINE AvxPick(std::uint32_t word, int shift)
@@ -176,8 +168,8 @@ struct AvxPick {
     }
 };
 
-// The child in the last lane that was hit, of at least one. It goes through memory, where it was stored before the
-// boxes were decided: only the lane has to be waited for.
+// The child in the last lane that was hit; at least one must be. Read back from memory, to which the children are
+// stored before the boxes are decided, so that only the lane number has to be waited for.
 WIVE_INLINE std::uint32_t last_hit_child(__m256i children, __m256 hits) {
     alignas(32) std::uint32_t lanes[8];
     _mm256_store_si256(reinterpret_cast<__m256i*>(lanes), children);

@@ -1,14 +1,15 @@
-// AVX2. It has no compress: a permute by an index looked up from the hit mask stands in for it.
+// AVX2, which has no compress: instead, a permute whose index is looked up by the hit mask.
 #pragma once
 
 #include <array>
 
+#include "traverse/concepts.h"
 #include "traverse/simd_avx.h"
 #include "traverse/stack.h"
 
 namespace wive {
 
-// For each mask of eight lanes, the lanes that are set, lowest first, four bits each: 1 KB.
+// The lanes set in each mask of eight, lowest first, in four bits each: 1 KB.
 inline constexpr std::array<std::uint32_t, 256> compress_table = [] {
     std::array<std::uint32_t, 256> table{};
     for (unsigned mask = 0; mask < 256; ++mask)
@@ -28,7 +29,7 @@ struct Avx2 {
     using Order = AvxOrder;
     using Pick = AvxPick;
 
-    // As Avx512::Lanes.
+    // Distances are permuted once, by the order and the compress together.
     template <bool in_order>
     struct Lanes {
         __m256i children;
@@ -57,5 +58,6 @@ struct Avx2 {
         WIVE_INLINE std::uint32_t last_hit() const { return last_hit_child(children, hits); }
     };
 };
+static_assert(Isa<Avx2>);
 
 }  // namespace wive

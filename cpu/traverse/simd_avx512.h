@@ -1,6 +1,7 @@
-// AVX-512: the compress that WiVe is made for.
+// AVX-512, whose compress WiVe is made for.
 #pragma once
 
+#include "traverse/concepts.h"
 #include "traverse/simd_avx.h"
 #include "traverse/stack.h"
 
@@ -17,7 +18,6 @@ struct Avx512 {
     using Order = AvxOrder;
     using Pick = AvxPick;
 
-    // Lanes on their way to the stack: children, distances and which of them hit.
     template <bool in_order>
     struct Lanes {
         __m256i children;
@@ -33,7 +33,7 @@ struct Avx512 {
                 distances = _mm256_permutevar8x32_ps(distances, order.slots);
             }
         }
-        // Compressed in registers and stored whole: compressing straight to memory is microcoded on some machines.
+        // Compresses in registers and stores whole vectors: compressing to memory is microcoded on some machines.
         WIVE_INLINE void compress_to(Stack::Top top) const {
             const __mmask8 mask = _mm256_movepi32_mask(_mm256_castps_si256(hits));
             if constexpr (in_order) _mm256_storeu_ps(&top.distance(), _mm256_maskz_compress_ps(mask, distances));
@@ -42,5 +42,6 @@ struct Avx512 {
         WIVE_INLINE std::uint32_t last_hit() const { return last_hit_child(children, hits); }
     };
 };
+static_assert(Isa<Avx512>);
 
 }  // namespace wive

@@ -1,5 +1,5 @@
-// Moeller and Trumbore 1997 on four triangles: fast, and as exact as a scene's numbers are. Neighbours may disagree on
-// an edge.
+// Moeller and Trumbore 1997, "Fast, Minimum Storage Ray/Triangle Intersection", on four triangles, in the precision of
+// the scene. Triangles that share an edge may disagree about a ray through it.
 #pragma once
 
 #include "core/layout.h"
@@ -8,25 +8,25 @@
 
 namespace wive {
 
-template <class Isa>
+template <class I>
 class FastTriangles {
-    using Real = typename Isa::Real;
-    using Real4 = typename Isa::Real4;
+    using Real = typename I::Real;
+    using Real4 = typename I::Real4;
 
 public:
-    using Frame = RayFrame<Isa>;
-    static constexpr bool hits_are_in_boxes = false;  // where a triangle is seen edge-on, t may lie anywhere
+    using Frame = RayFrame<I>;
+    static constexpr bool hits_are_in_boxes = false;  // t may lie anywhere if a triangle is seen edge-on
 
-    [[gnu::always_inline]] explicit FastTriangles(const RayFrame<Isa>& ray) {
+    [[gnu::always_inline]] explicit FastTriangles(const RayFrame<I>& ray) {
         for (int axis = 0; axis < 3; ++axis) {
             origin_[axis] = Real4::all(ray.origin[axis]);
             direction_[axis] = Real4::all(ray.direction[axis]);
         }
     }
 
-    // The lanes of a block that are hit, and what solve() needs to say where.
+    // The lanes of a block that are hit, and what solve() needs for t, u and v.
     struct Found {
-        unsigned lanes;
+        unsigned hit_mask;
         Real4 u, v, det, q[3];
     };
 
@@ -46,26 +46,26 @@ public:
         const Real4 size = abs(found.det), zero = Real4::all(0);
         found.u = flip_sign(dot(s, p), found.det);
         found.v = flip_sign(dot(direction_, found.q), found.det);
-        // A determinant of zero (a ray in the triangle's plane) fails, and so does NaN (an unused lane): where u is
+        // A determinant of zero fails (the ray is in the triangle's plane), and so does NaN (an unused lane): if u is
         // NaN and v is not, min gives v, but the sum is NaN.
-        found.lanes = corners.used(all_in_order(zero, min(found.u, found.v), found.u + found.v, size, zero, size));
+        found.hit_mask = corners.used(all_in_order(zero, min(found.u, found.v), found.u + found.v, size, zero, size));
         return found;
     }
 
     // Offers the hits to the query; true once the query is done.
-    template <class Corners, class Query>
+    template <class Corners, OfferedQuery<Real> Query>
     [[gnu::always_inline]] bool solve(const Corners& corners, const Found& found, Query& query) const {
         alignas(4 * sizeof(Real)) Real ts[4], us[4], vs[4];
         const Real4 size = abs(found.det);
         Real4 e2[3], q[3];
         for (unsigned axis = 0; axis < 3; ++axis) {
             e2[axis] = corners.edge(2, axis, corners.vertex(0, axis));
-            q[axis] = found.q[axis] / size;  // first: the product of three lengths may overflow
+            q[axis] = found.q[axis] / size;  // before the dot product, in which three lengths may overflow
         }
         flip_sign(dot(e2, q), found.det).store(ts);
         (found.u / size).store(us);
         (found.v / size).store(vs);
-        return offer_lanes(corners.block, found.lanes, ts, us, vs, query);
+        return offer_lanes(corners.block, found.hit_mask, ts, us, vs, query);
     }
 
 private:

@@ -1,11 +1,11 @@
 // Woop, Benthin and Wald 2013, "Watertight Ray/Triangle Intersection", on four triangles.
 //
-// Vertices are moved into a space where the ray is the z axis: A_x = (a_x - o_x) - S_x (a_z - o_z). Rounding moves a
-// vertex there by at most 6u max|a - o| (u = 2^-24), but it moves it alike for every triangle that shares it, so
-// the mesh stays closed. The edge functions then have the exact sign of the rounded corners: a difference of two
-// rounded products that is not zero has the sign of the exact one, because rounding is monotonic, and where it is
-// zero the products are taken again in double, where they are exact. Fused multiply-adds would break that symmetry.
-// Scenes of doubles have the same test in double, u = 2^-53, and triangle_watertight_float64.h for what follows.
+// Vertices are transformed into a space in which the ray is the z axis: A_x = (a_x - o_x) - S_x (a_z - o_z). Rounding
+// moves a vertex there by at most 6u max|a - o| (u = 2^-24), but by the same amount for every triangle that shares the
+// vertex, so the mesh stays closed. The edge functions then have the exact sign for the rounded corners: a difference
+// of two rounded products that is not zero has the sign of the exact one, because rounding is monotonic, and if it is
+// zero, the products are computed again in double, in which they are exact. Fused multiply-adds would break that
+// symmetry. Scenes of doubles use the same test in double, u = 2^-53; triangle_watertight_float64.h does the rest.
 #pragma once
 
 #include <cmath>
@@ -17,34 +17,34 @@
 
 namespace wive {
 
-// What the test needs of a ray besides: the shear that makes it the z axis.
-template <class Isa>
-struct WatertightFrame : AxisFrame<Isa> {
-    using Real = typename Isa::Real;
+// A ray with the shear that makes it the z axis.
+template <Isa I>
+struct WatertightFrame : AxisFrame<I> {
+    using Real = typename I::Real;
     Real shear[2];
 
     [[gnu::always_inline]] bool load(const BvhView& bvh, const RayBatch<Real>& rays, std::size_t i) {
-        if (!AxisFrame<Isa>::load(bvh, rays, i)) [[unlikely]]
+        if (!AxisFrame<I>::load(bvh, rays, i)) [[unlikely]]
             return false;
         for (int k = 0; k < 2; ++k) {
             shear[k] = this->direction[this->axis[k]] / this->direction[this->axis[2]];
-            // Smaller slopes move nothing by as much as rounding does; without them no product underflows.
+            // Smaller slopes move corners by less than rounding does; without them no product underflows.
             if constexpr (sizeof(Real) == sizeof(double)) shear[k] = std::fabs(shear[k]) < 0x1p-100 ? 0.0 : shear[k];
         }
         return true;
     }
 };
 
-template <class Isa>
+template <class I>
 class WatertightTriangles {
-    using Real = typename Isa::Real;
-    using Real4 = typename Isa::Real4;
-    using Float4 = typename Isa::Float4;
-    using Double4 = typename Isa::Double4;
+    using Real = typename I::Real;
+    using Real4 = typename I::Real4;
+    using Float4 = typename I::Float4;
+    using Double4 = typename I::Double4;
 
 public:
-    using Frame = WatertightFrame<Isa>;
-    static constexpr bool hits_are_in_boxes = true;  // made larger by the slack of frame.h
+    using Frame = WatertightFrame<I>;
+    static constexpr bool hits_are_in_boxes = true;  // up to the slack of frame.h
 
     [[gnu::always_inline]] explicit WatertightTriangles(const Frame& ray) : ray_(ray) {
         for (int k = 0; k < 3; ++k) axis_[k] = ray.axis[k];
@@ -52,13 +52,14 @@ public:
         for (int k = 0; k < 3; ++k) origin_[k] = Real4::all(ray.origin[axis_[k]]);
     }
 
-    // The lanes of a block that may be hit, and what solve() needs to say where.
+    // The lanes of a block that may be hit, and what solve() needs for t, u and v.
     struct FoundFloats {
-        unsigned lanes, ties;  // ties: where rounding may have hidden a sign
-        Float4 side;           // negative where the edge functions are
+        unsigned hit_mask;
+        unsigned zero_edges;  // the lanes with an edge function of zero, whose sign rounding may have hidden
+        Float4 side;          // has the sign of the edge functions
     };
     struct FoundDoubles {
-        unsigned lanes;  // the rest is taken again, which costs less than to keep it for every block
+        unsigned hit_mask;  // solve() computes the rest again, which costs less than keeping it for every block
     };
     using Found = std::conditional_t<precision_of<Real> == Precision::float64, FoundDoubles, FoundFloats>;
 
@@ -67,37 +68,37 @@ public:
         const Sheared<Corners> sheared(*this, corners);
         const auto& [u, v, w] = sheared.weight;
         const Real4 low = min(min(u, v), w), high = max(max(u, v), w);
-        const unsigned lanes = corners.used(one_sided(low, high));
+        const unsigned hit_mask = corners.used(one_sided(low, high));
         if constexpr (precision_of<Real> == Precision::float64) {
-            return {lanes};
+            return {hit_mask};
         } else {
             const Float4 zero = Float4::all(0);
-            return {lanes, equal(low, zero) | equal(high, zero), low + zero};  // adding zero clears the sign of -0
+            return {hit_mask, equal(low, zero) | equal(high, zero), low + zero};  // adding zero clears the sign of -0
         }
     }
 
     // Offers the hits to the query; true once the query is done.
-    template <class Corners, class Query>
+    template <class Corners, OfferedQuery<Real> Query>
     [[gnu::always_inline]] bool solve(const Corners& corners, const Found& found, Query& query) const {
         if constexpr (precision_of<Real> == Precision::float64) {
             const Sheared<Corners> sheared(*this, corners);
-            Solution64<Isa> hits;
-            const unsigned lanes =
-                hits.solve(found.lanes, sheared.x, sheared.y, sheared.z, sheared.weight, ray_.direction[axis_[2]]);
-            return offer_lanes(corners.block, lanes, hits.t, hits.u, hits.v, query);
+            Float64Hits<I> hits;
+            const unsigned hit_mask =
+                hits.solve(found.hit_mask, sheared.x, sheared.y, sheared.z, sheared.weight, ray_.direction[axis_[2]]);
+            return offer_lanes(corners.block, hit_mask, hits.t, hits.u, hits.v, query);
         } else {
-            unsigned lanes = found.lanes;
+            unsigned hit_mask = found.hit_mask;
             Float4 side = found.side;
-            if (const unsigned ties = lanes & found.ties; ties != 0) [[unlikely]]
-                lanes = resolve_zero_edges(corners.block, lanes, ties, side);
+            if (const unsigned zero_edges = hit_mask & found.zero_edges; zero_edges != 0) [[unlikely]]
+                hit_mask = resolve_zero_edges(corners.block, hit_mask, zero_edges, side);
             alignas(16) float ts[4], us[4], vs[4];
-            intersect(corners, lanes, side, ts, us, vs);
-            return offer_lanes(corners.block, lanes, ts, us, vs, query);
+            intersect(corners, hit_mask, side, ts, us, vs);
+            return offer_lanes(corners.block, hit_mask, ts, us, vs, query);
         }
     }
 
 private:
-    // The corners where the ray is the z axis, and the edge functions.
+    // The corners in the space in which the ray is the z axis, and the edge functions.
     template <class Corners>
     struct Sheared {
         Real4 x[3], y[3], z[3], weight[3];
@@ -115,11 +116,11 @@ private:
         }
     };
 
-    // t, u and v in double, rounded once. The plane across the ray is scaled by the direction's longest component,
-    // which spares the divisions. Where only the rounding of the corners let the ray in, a weight is on the wrong side
-    // here: there the rounded triangle is what is hit, and t lies where its boxes are looked for.
+    // Computes t, u and v in double and rounds them once. x and y are scaled by the longest component of the direction,
+    // which saves the divisions. If the ray hits only the triangle with rounded corners, a weight has the wrong sign
+    // here: t, u and v are then those of the rounded triangle, so that t lies within the box (frame.h).
     template <class Corners>
-    [[gnu::always_inline]] void intersect(const Corners& corners, unsigned lanes, Float4 side, float (&ts)[4],
+    [[gnu::always_inline]] void intersect(const Corners& corners, unsigned hit_mask, Float4 side, float (&ts)[4],
                                           float (&us)[4], float (&vs)[4]) const {
         const Double4 forward = Double4::all(ray_.direction[axis_[2]]);
         const Double4 shear_x = Double4::all(ray_.direction[axis_[0]]),
@@ -144,35 +145,35 @@ private:
         Float4::narrow(weight[1] * inverse).store(us);
         Float4::narrow(weight[2] * inverse).store(vs);
         const unsigned inside = less_equal(zero, lowest) & ~less_equal(det, zero);
-        if (const unsigned rounded = lanes & ~inside; rounded != 0) [[unlikely]]
+        if (const unsigned rounded = hit_mask & ~inside; rounded != 0) [[unlikely]]
             intersect_rounded(corners.block, rounded, ts, us, vs);
     }
 
-    // Decides the lanes in which rounding hid a sign; returns the lanes that remain.
+    // Decides the lanes with an edge function of zero by exact signs; returns the hit mask and corrects `side`.
     template <class Block>
-    [[gnu::noinline]] unsigned resolve_zero_edges(const Block& block, unsigned lanes, unsigned ties,
+    [[gnu::noinline]] unsigned resolve_zero_edges(const Block& block, unsigned hit_mask, unsigned zero_edges,
                                                   Float4& side) const {
         alignas(16) float sides[4];
         side.store(sides);
-        for (; ties != 0; ties &= ties - 1) {
-            const int lane = __builtin_ctz(ties);
+        for (; zero_edges != 0; zero_edges &= zero_edges - 1) {
+            const int lane = __builtin_ctz(zero_edges);
             double edges[3], z[3];
             exact_edges(block, lane, edges, z);
             const bool negative = edges[0] < 0 || edges[1] < 0 || edges[2] < 0;
             const bool positive = edges[0] > 0 || edges[1] > 0 || edges[2] > 0;
-            if (negative == positive) lanes &= ~(1u << lane);  // on both sides, or edge-on
+            if (negative == positive) hit_mask &= ~(1u << lane);  // the ray passes outside, or the triangle is edge-on
             sides[lane] = negative ? -1.0f : 1.0f;
         }
         side = Float4::load(sides);
-        return lanes;
+        return hit_mask;
     }
 
-    // The same for the triangle with rounded corners.
+    // Computes t, u and v of the triangle with rounded corners.
     template <class Block>
-    [[gnu::noinline]] void intersect_rounded(const Block& block, unsigned lanes, float (&ts)[4], float (&us)[4],
+    [[gnu::noinline]] void intersect_rounded(const Block& block, unsigned hit_mask, float (&ts)[4], float (&us)[4],
                                              float (&vs)[4]) const {
-        for (; lanes != 0; lanes &= lanes - 1) {
-            const int lane = __builtin_ctz(lanes);
+        for (; hit_mask != 0; hit_mask &= hit_mask - 1) {
+            const int lane = __builtin_ctz(hit_mask);
             double weight[3], z[3];
             exact_edges(block, lane, weight, z);
             const double det = weight[0] + weight[1] + weight[2];
@@ -183,7 +184,7 @@ private:
         }
     }
 
-    // The edge functions of one lane's rounded corners, with exact signs, and the corners' depths.
+    // Computes the edge functions of one lane's rounded corners, with exact signs, and the corners' depths.
     template <class Block>
     [[gnu::noinline]] void exact_edges(const Block& block, int lane, double (&edges)[3], double (&depth)[3]) const {
         double x[3], y[3];
@@ -204,7 +205,7 @@ private:
     }
 
     const Frame& ray_;
-    std::size_t axis_[3];  // the direction's longest axis last
+    std::size_t axis_[3];  // the longest axis of the direction last
     Real shear_[2];
     Real4 origin_[3];
 };
