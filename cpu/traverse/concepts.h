@@ -35,7 +35,7 @@ concept FourLanes = requires(V a, V b, const Number* from, Number* to, Number x)
     { max(a, b) } -> std::same_as<V>;                              // a > b ? a : b, hence b if either is NaN
     { abs(a) } -> std::same_as<V>;                                 // a with its sign bit cleared
     { flip_sign(a, b) } -> std::same_as<V>;                        // a, negated if b has its sign bit set
-    { highest_lane(a) } -> std::same_as<Number>;                   // the largest lane, none of which is NaN
+    { highest_lane(a) } -> std::same_as<Number>;                   // the largest lane, if none is NaN
     { less_equal(a, b) } -> std::same_as<unsigned>;                // mask of a <= b
     { equal(a, b) } -> std::same_as<unsigned>;                     // mask of a == b
     { all_in_order(a, b, a, b, a, b) } -> std::same_as<unsigned>;  // mask of 1st <= 2nd, 3rd <= 4th and 5th < 6th
@@ -65,15 +65,15 @@ concept HitLanes = requires(const H hits, const std::uint32_t* row, std::uint32_
 
 // Eight floats: one per child of a node, or one per ray of half a packet.
 template <class V, class Hits>
-concept EightFloats = requires(V a, V b, const float* from, const std::uint8_t* bytes, float x) {
+concept EightFloats = requires(V a, V b, V c, const float* from, const std::uint8_t* bytes, float x) {
     { V::load(from) } -> std::same_as<V>;          // from memory aligned to 32 bytes
     { V::load(bytes) } -> std::same_as<V>;         // eight bytes as floats
     { V::all(x) } -> std::same_as<V>;              // the same number in every lane
     { a * b } -> std::same_as<V>;                  // product
-    { multiply_add(a, b, a) } -> std::same_as<V>;  // a * b + c, fused or not: the slack in frame.h allows for either
+    { multiply_add(a, b, c) } -> std::same_as<V>;  // a * b + c, fused or not: the slack in frame.h allows for either
     { min(a, b) } -> std::same_as<V>;              // as for four lanes
     { max(a, b) } -> std::same_as<V>;              // as for four lanes
-    { highest_lane(a) } -> std::same_as<float>;    // the largest lane, none of which is NaN
+    { highest_lane(a) } -> std::same_as<float>;    // the largest lane, if none is NaN
     { hits(a, b) } -> std::same_as<Hits>;          // the lanes in which a <= b
 };
 
@@ -83,7 +83,7 @@ concept CompressedChildren =
     // Permutes the lanes by the order if in_order; else they stay in slot order.
     std::constructible_from<L, typename I::Order, typename I::Hits, typename I::Float8, const std::uint32_t*> &&
     requires(const L lanes, Stack::Top top) {
-        lanes.compress_to(top);                               // stores the lanes hit from top upwards, the others not
+        lanes.compress_to(top);                               // stores the lanes that were hit, from top upwards
         { lanes.last_hit() } -> std::same_as<std::uint32_t>;  // the child in the last lane hit; at least one must be
     };
 
@@ -139,8 +139,8 @@ concept RayQuery = std::same_as<decltype(Q::interval), Interval<Real>> &&  // in
                        typename Q::InFlight;  // the variant of the query for rays in flight
                        // Whether children are visited front to back, because the interval shrinks with every hit.
                        { Q::in_order } -> std::convertible_to<bool>;
-                       // Whether the number of hits matters, so that a closed surface is crossed exactly once where
-                       // triangles meet: exact tests perturb the edges then.
+                       // Whether the number of hits matters: exact tests then perturb edges, so that a ray through
+                       // an edge or a vertex crosses a closed surface once.
                        { Q::perturb_edges } -> std::convertible_to<bool>;
                        query.write(hits, i, scale);  // writes the result of ray i; scale: see RayFrame
                    };

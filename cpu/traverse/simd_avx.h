@@ -176,4 +176,33 @@ WIVE_INLINE std::uint32_t last_hit_child(__m256i children, __m256 hits) {
     return lanes[31 - _lzcnt_u32(static_cast<unsigned>(_mm256_movemask_ps(hits)))];
 }
 
+// What AVX2 and AVX-512 have in common.
+struct Avx {
+    using Real = float;
+    using Real4 = SseFloat4;
+    using Float4 = SseFloat4;
+    using Double4 = AvxDouble4;
+
+    using Float8 = AvxFloat8;
+    using Hits = AvxHits;
+    using Order = AvxOrder;
+    using Pick = AvxPick;
+
+    // Children and hits on their way to the stack.
+    template <bool in_order>
+    struct Children {
+        __m256i children;
+        __m256 hits;
+
+        WIVE_INLINE Children(const Order& order, Hits by_slot, const std::uint32_t* child)
+            : children(_mm256_load_si256(reinterpret_cast<const __m256i*>(child))), hits(by_slot.v) {
+            if constexpr (in_order) {
+                children = _mm256_permutevar8x32_epi32(children, order.slots);
+                hits = _mm256_permutevar8x32_ps(hits, order.slots);
+            }
+        }
+        WIVE_INLINE std::uint32_t last_hit() const { return last_hit_child(children, hits); }
+    };
+};
+
 }  // namespace wive
