@@ -2,8 +2,8 @@
 //
 // Fuetterling, Lojewski, Pfreundt, Hamann, Ebert: "Accelerated Single Ray Tracing for Wide Vector Units", HPG 2017.
 //
-// Single rays and packets of rays use walk(), below. A batch with at least 16 rays in flight runs InFlight::trace
-// (in_flight.h), which calls visit() for one ray after another, or Packet::trace (packet.h) for coherent neighbours.
+// Which loop runs: single rays and packets run walk(), below. A batch of 16 rays or more runs InFlight::trace
+// (in_flight.h), which calls visit() for many rays in turns and passes coherent neighbours to Packet::trace (packet.h).
 //
 // Template parameters, with their contracts in concepts.h:
 //   I          the instruction set: its vectors, masks and compress.
@@ -14,6 +14,8 @@
 //   in_order   when true, children are pushed farthest first with their distances, and skipped behind the best hit.
 // A kernel contains only the code of its own combination.
 #pragma once
+
+#include <cassert>
 
 #include "core/layout.h"
 #include "core/ray.h"
