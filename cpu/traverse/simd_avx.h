@@ -187,22 +187,6 @@ struct Avx {
     using Hits = AvxHits;
     using Order = AvxOrder;
     using Pick = AvxPick;
-
-    // Children and hits on their way to the stack.
-    template <bool in_order>
-    struct Children {
-        __m256i children;
-        __m256 hits;
-
-        WIVE_INLINE Children(const Order& order, Hits by_slot, const std::uint32_t* child)
-            : children(_mm256_load_si256(reinterpret_cast<const __m256i*>(child))), hits(by_slot.v) {
-            if constexpr (in_order) {
-                children = _mm256_permutevar8x32_epi32(children, order.slots);
-                hits = _mm256_permutevar8x32_ps(hits, order.slots);
-            }
-        }
-        WIVE_INLINE std::uint32_t last_hit() const { return last_hit_child(children, hits); }
-    };
 };
 
 }  // namespace wive
