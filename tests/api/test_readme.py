@@ -1,0 +1,40 @@
+"""The programs in README.md and docs/warp.md run as they are printed."""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+PYTHON_BLOCK = re.compile(r"^```python\n(.*?)^```", re.DOTALL | re.MULTILINE)
+
+
+def programs(page: str) -> list[str]:
+    """The page's Python blocks."""
+    return PYTHON_BLOCK.findall((ROOT / page).read_text(encoding="utf-8"))
+
+
+def run(program: str, folder: Path) -> str:
+    """What the program prints; from a file, since Warp reads the source of kernels."""
+    path = folder / "program.py"
+    path.write_text(program, encoding="utf-8")
+    done = subprocess.run(
+        [sys.executable, "-W", "error", str(path)],
+        cwd=folder, capture_output=True, text=True, timeout=280, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def test_the_readmes_program_runs(tmp_path: Path) -> None:
+    (program,) = programs("README.md")
+    printed = run(program, tmp_path).strip()
+    assert printed == "[ 1.  1. inf] [1 1 0]"
+    assert program.endswith(f"# {printed}\n")
+
+
+@pytest.mark.parametrize("number", range(len(programs("docs/warp.md"))))
+def test_the_warp_pages_programs_run(number: int, tmp_path: Path, device: str) -> None:
+    assert run(programs("docs/warp.md")[number], tmp_path) != ""
