@@ -1,8 +1,8 @@
-"""Ambient occlusion in a kernel of your own: how open to the sky is the ground round a tower?
+"""Ambient occlusion in your own Warp kernel: how much sky does the ground around a tower see?
 
     python examples/ambient_occlusion.py --device cpu
 
-Prints a map of the ground from above: the darker the letter, the less sky it sees. The tower is left blank.
+Prints a map of the ground from above: the darker the character, the less sky is visible. The tower is blank.
 """
 
 import argparse
@@ -20,7 +20,7 @@ SHADES = "@#*+=-. "
 
 @wp.kernel
 def sky_seen(bvh: Bvh, places: wp.array(dtype=wp.vec3), sky: wp.array(dtype=float)):
-    """From each place up into the hemisphere, by cosine."""
+    """The fraction of cosine-distributed rays into the upper hemisphere that hit nothing, per place."""
     i = wp.tid()
     state = wp.rand_init(1, i)
     free = int(0)  # noqa: RUF046, UP018
@@ -32,7 +32,7 @@ def sky_seen(bvh: Bvh, places: wp.array(dtype=wp.vec3), sky: wp.array(dtype=floa
 
 
 def tower() -> tuple[np.ndarray, np.ndarray]:
-    """A tower of 2 x 2 x 6 on a ground of 12 x 12."""
+    """Vertices and faces of a tower of 2 x 2 x 6 on a ground of 12 x 12."""
     corners = [(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (0, 6)] + [
         (-6, -6, 0),
         (6, -6, 0),
@@ -45,7 +45,7 @@ def tower() -> tuple[np.ndarray, np.ndarray]:
 
 
 def main() -> None:
-    """Trace the map and print it."""
+    """Find the places by rays from above, trace the sky from there, and print the map."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
@@ -56,7 +56,7 @@ def main() -> None:
     steps = np.linspace(-5.75, 5.75, SIDE)
     above = np.stack([*np.meshgrid(steps, steps), np.full((SIDE, SIDE), 10.0)], axis=-1).reshape(-1, 3)
     hits = scene.intersect(wp.array(above, dtype=wp.vec3, device=device), (0, 0, -1))
-    places = hits.spawn((0, 0, 1))  # where rays upwards can start without hitting what was hit
+    places = hits.spawn((0, 0, 1))  # origins for rays upwards that can't hit the triangle they leave
     sky = wp.zeros(len(places), dtype=float, device=device)
     wp.launch(sky_seen, len(places), inputs=[scene.tree.handle, places, sky], device=device)
     check(scene.tree)
