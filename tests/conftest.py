@@ -5,6 +5,7 @@ that can't be used ends the run with the reason. Without it they run on Warp's C
 """
 
 import os
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -13,6 +14,9 @@ import pytest
 
 import wive
 from wive._internal import devices
+
+# For tests of `bench`; last, so that the installed wive comes before its source folder.
+sys.path.append(str(Path(__file__).resolve().parents[1]))
 
 SCENES = Path(__file__).resolve().parents[2] / "shared" / "scenes"
 BACKENDS = wive.backends()

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 RESULTS = REPOSITORY / "bench" / "results"
+LONGEST_LINE = 110  # characters of a dict outside tables; in a longer one each key has a line of its own
 Row = dict[str, Any]
 
 
@@ -75,12 +76,37 @@ def save(name: str, content: Row, figure: "Figure | None", folder: Path | None, 
     folder = folder or (RESULTS if whole else cache_folder() / "partial")
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / f"{name}.json"
-    path.write_text(json.dumps({"bench": name, "environment": environment(), **content}, indent=1) + "\n")
+    path.write_text(to_json({"bench": name, "environment": environment(), **content}))
     print(f"\nwrote {path}")
     if figure is not None:
         figure.savefig(path.with_suffix(".png"), dpi=130)
         print(f"wrote {path.with_suffix('.png')}")
     return path
+
+
+def to_json(content: Row) -> str:
+    """JSON with one line per row of a table and one per key of the rest, so that a diff shows what changed."""
+    return _json(content, 0) + "\n"
+
+
+def _json(value: object, depth: int) -> str:
+    line = json.dumps(value)
+    is_long = depth < 2 and len(line) > LONGEST_LINE
+    if isinstance(value, dict) and (is_long or _holds_rows(value)):
+        items = [f"{json.dumps(key)}: {_json(part, depth + 1)}" for key, part in value.items()]
+    elif isinstance(value, list) and _holds_rows(value):
+        items = [json.dumps(row) for row in value]
+    else:
+        return line
+    indent = "\n" + " " * (depth + 1)
+    return f"{line[0]}{indent}{f',{indent}'.join(items)}\n{' ' * depth}{line[-1]}"
+
+
+def _holds_rows(value: object) -> bool:
+    """Whether it is a list of dicts or lists, or a dict with such a list anywhere in it."""
+    if isinstance(value, dict):
+        return any(_holds_rows(part) for part in value.values())
+    return isinstance(value, list) and any(isinstance(item, dict | list) for item in value)
 
 
 def _text(value: object) -> str:

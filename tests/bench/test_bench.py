@@ -11,7 +11,10 @@ from typing import Any
 
 import pytest
 
+from bench.support.report import to_json
+
 ROOT = Path(__file__).resolve().parents[2]
+RESULTS = ROOT / "bench" / "results"
 SCENE = "terrain_2k"
 # What a machine may lack that only some benches need.
 LACKS = re.compile(r"embreex is not installed|carries no libembree4|no C\+\+ compiler|can't open Embree")
@@ -119,6 +122,34 @@ def test_an_unknown_scene_ends_in_one_line(bench: Callable[..., dict[str, Any]])
     assert answer.returncode == 2
     assert answer.stderr.startswith("bench order: no scene 'nowhere'")
     assert answer.stderr.count("\n") == 1
+
+
+@pytest.mark.parametrize("path", sorted(RESULTS.glob("*.json")), ids=lambda path: path.stem)
+def test_committed_results_have_one_line_per_row(path: Path) -> None:
+    assert path.read_text() == to_json(json.loads(path.read_text()))
+
+
+def test_json_has_one_line_per_row_and_loses_nothing() -> None:
+    rows = [{"scene": "a", "steps": [1, 2]}, {"scene": "b", "steps": [], "share": 1 / 3}]
+    content = {"isa": ["avx", "fma"], "tables": {"rows": rows, "pairs": [[1, 2], [3, 4]]}, "none": []}
+    written = to_json(content)
+    assert json.loads(written) == content
+    assert written.splitlines() == [
+        "{",
+        ' "isa": ["avx", "fma"],',
+        ' "tables": {',
+        '  "rows": [',
+        '   {"scene": "a", "steps": [1, 2]},',
+        f'   {{"scene": "b", "steps": [], "share": {1 / 3!r}}}',
+        "  ],",
+        '  "pairs": [',
+        "   [1, 2],",
+        "   [3, 4]",
+        "  ]",
+        " },",
+        ' "none": []',
+        "}",
+    ]
 
 
 def quote(*options: str) -> str:
