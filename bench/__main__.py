@@ -4,6 +4,7 @@ import importlib
 import sys
 from pathlib import Path
 
+MODULES = {"convert": "support.convert_scene"}  # of commands that are not called like their module
 BENCHES = {
     "build": "build time, SAH and memory against native Embree, from 100 thousand to 20 million triangles",
     "embree": "single rays against native Embree: speed, build time, SAH, memory",
@@ -15,6 +16,7 @@ BENCHES = {
     "python": "what a Python user sees: embreex, trimesh, Warp and wive, NumPy in and out",
     "quality": 'what quality="high" saves in steps per ray and costs in build time',
     "quote": "not a bench: writes the tables of docs/benchmarks.md from bench/results",
+    "convert": "not a bench: makes a scene file of meshes in other formats",
 }
 
 
@@ -31,7 +33,7 @@ def main() -> int:
     from bench.contenders.compiled_shim import BenchError
 
     try:
-        importlib.import_module(f"bench.{name}").main(options)
+        importlib.import_module(f"bench.{MODULES.get(name, name)}").main(options)
     except (BenchError, ImportError, OSError) as problem:
         print(f"bench {name}: {problem}", file=sys.stderr)
         return 2

@@ -18,7 +18,7 @@ from bench.contenders.native_embree import Isa
 from bench.support import report
 from bench.support.features import QUALITIES, qualities
 from bench.support.options import listed, numbers, scene_parser
-from bench.support.scenes import TERRAIN, SceneFolder
+from bench.support.scenes import SceneFolder
 from bench.support.timing import Effort, core_count
 from wive import _cpu
 
@@ -26,8 +26,11 @@ matplotlib.use("Agg")
 from matplotlib import pyplot
 from matplotlib.figure import Figure
 
-TERRAINS = ("terrain_100k", "terrain_400k", "terrain_1600k", "terrain_6400k", "terrain_20000k")
-TILES = ("1x1", "2x2", "5x5")
+# Two families, each from small to large.
+USUAL = (
+    "terrain_100k", "terrain_400k", "terrain_1600k", "terrain_6400k", "terrain_20000k",
+    "bmw_m6_tiled_1x1", "bmw_m6_tiled_2x2", "bmw_m6_tiled_5x5",
+)  # fmt: skip
 QUICK_SCENES = ("terrain_10k", "terrain_40k")
 QUICK_EFFORT = Effort(least=2, most=2)
 # As many rounds as large meshes leave time for: about so many triangles are built a side.
@@ -52,11 +55,11 @@ def main(options: Sequence[str]) -> None:
     _, hard = resource.getrlimit(resource.RLIMIT_AS)
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY_LIMIT, hard))
     folder = SceneFolder(chosen.scene_dir)
-    names = folder.check(chosen.scenes or (QUICK_SCENES if chosen.quick else scene_names(folder)))
+    scenes = folder.select(chosen.scenes, QUICK_SCENES if chosen.quick else USUAL)
     isa: Isa = "avx2" if _cpu.kernels().get("avx512") else "avx512"
     build: list[report.Row] = []
     trees: list[report.Row] = []
-    for name in names:
+    for name in scenes.names:
         mesh = folder.load(name)
         rounds = max(FEWEST_ROUNDS, min(MOST_ROUNDS, TRIANGLES_BUILT // len(mesh.faces)))
         effort = QUICK_EFFORT if chosen.quick else Effort(least=min(7, rounds), most=rounds)
@@ -78,14 +81,8 @@ def main(options: Sequence[str]) -> None:
     )
     print(f"\npeak memory of this process: {peak:.1f} GiB")
     content = {"isa": isa, "peak_gib": peak, "build": build, "trees": trees}
-    whole = not (chosen.quick or chosen.scenes or chosen.quality or chosen.threads != default_threads())
+    whole = scenes.whole and not (chosen.quick or chosen.quality or chosen.threads != default_threads())
     report.save("build", content, draw(build), chosen.out, whole=whole)
-
-
-def scene_names(folder: SceneFolder) -> list[str]:
-    """Both families, each from small to large."""
-    model = "bmw_m6" if "bmw_m6" in folder.names() else TERRAIN
-    return [*TERRAINS, *(f"{model}_tiled_{tiles}" for tiles in TILES)]
 
 
 def default_threads() -> tuple[int, ...]:

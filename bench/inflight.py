@@ -21,7 +21,7 @@ from bench.support import report
 from bench.support.features import Accuracy, build_tree
 from bench.support.options import listed, numbers, scene_parser
 from bench.support.rays import KINDS, Rays, recorded_rays
-from bench.support.scenes import Mesh, SceneFolder
+from bench.support.scenes import LARGEST, Mesh, SceneFolder
 from bench.support.timing import Effort, compare_in_turn, one_core, timed
 from wive import _cpu
 
@@ -31,8 +31,8 @@ from matplotlib.figure import Figure
 
 IN_FLIGHT = (1, 2, 4, 8, 12, 16, 24, 32, 48, 64)
 RAY_KINDS = ("diffuse", "random")
-SMALLEST = "terrain_5k"  # its tree fits the second-level cache
-USUAL = ("living_room", "terrain_jacksboro", "bmw_m6", "furball_embree_tubes")
+# The first one's tree fits the second-level cache.
+USUAL = ("terrain_5k", "living_room", "terrain_jacksboro", "bmw_m6", "furball_embree_tubes", LARGEST)
 RAYS, QUICK_RAYS = 131_072, 4_096
 EFFORT, QUICK_EFFORT = Effort(least=7, most=11), Effort(least=2, most=2)
 CHASED_BYTES, CHASED_LOADS = 1 << 29, 4_000_000
@@ -49,12 +49,11 @@ def main(options: Sequence[str]) -> None:
     """Runs the bench with command-line options."""
     chosen = parse_options(options)
     folder = SceneFolder(chosen.scene_dir)
-    usual = [name for name in USUAL if name in folder.names()]
-    names = folder.check(chosen.scenes or [SMALLEST, *usual, folder.largest()])
+    scenes = folder.select(chosen.scenes, USUAL)
     latency = memory_latency(*((QUICK_BYTES, QUICK_LOADS) if chosen.quick else (CHASED_BYTES, CHASED_LOADS)))
     print(f"a load from memory takes {latency * 1e9:.0f} ns", flush=True)
     rows: list[report.Row] = []
-    for name in names:
+    for name in scenes.names:
         mesh = folder.load(name)
         recorded = recorded_rays(mesh)
         sets = [recorded[kind].thinned(QUICK_RAYS if chosen.quick else RAYS) for kind in chosen.rays]
@@ -66,7 +65,7 @@ def main(options: Sequence[str]) -> None:
     best = best_rows(rows)
     report.print_table(rows, COLUMNS, "Rays in flight: speed over that of one ray at a time")
     report.print_table(best, BEST_COLUMNS, "The best number of rays in flight; tuned: speedup of the default")
-    whole = not (chosen.quick or chosen.scenes or chosen.kernel) and chosen.in_flight == IN_FLIGHT
+    whole = scenes.whole and not (chosen.quick or chosen.kernel) and chosen.in_flight == IN_FLIGHT
     content = {
         "memory_latency_ns": latency * 1e9,
         "kernel": chosen.kernel or best_kernel(),

@@ -50,14 +50,14 @@ def main(options: Sequence[str]) -> None:
     """Runs the bench with command-line options."""
     chosen = parse_options(options)
     folder = SceneFolder(chosen.scene_dir)
-    names = folder.check(chosen.scenes)
+    scenes = folder.select(chosen.scenes)
     device, description = warp_device(chosen.device)
     lanes: tuple[LaneForm, ...] = chosen.lanes or ((1, 8) if device.startswith("cuda") else (8,))
     curve: list[report.Row] = []
     comparison: list[report.Row] = []
     means: list[report.Row] = []
     if "curve" in chosen.parts:
-        mesh = folder.load(names[CURVE_SCENE])
+        mesh = folder.load(scenes.names[CURVE_SCENE])
         rays = recorded_rays(mesh)[chosen.rays]
         with one_core() if chosen.threads == 1 else nullcontext():
             for contender in contenders(mesh, device, lanes, chosen.threads, chosen.contenders):
@@ -68,7 +68,7 @@ def main(options: Sequence[str]) -> None:
         from bench.contenders.warp_race import compare_rows, mean_rows
 
         effort = QUICK if chosen.quick else Effort()
-        for name in names:
+        for name in scenes.names:
             mesh = folder.load(name)
             recorded = recorded_rays(mesh)
             most = QUICK_RAYS if chosen.quick else RAYS
@@ -89,7 +89,8 @@ def main(options: Sequence[str]) -> None:
     }
     figure = draw(curve) if curve else None
     suffix = f"-{description['name'].replace(' ', '-')}" if device.startswith("cuda") else ""
-    report.save(f"latency{suffix}", content, figure, chosen.out, whole=is_whole(chosen))
+    whole = scenes.whole and bool(device) and is_whole(chosen)
+    report.save(f"latency{suffix}", content, figure, chosen.out, whole=whole)
 
 
 def curve_rows(contender: Contender, rays: Rays, quick: bool) -> Iterator[report.Row]:
@@ -178,9 +179,8 @@ def lane_forms(text: str) -> tuple[LaneForm, ...]:
 
 
 def is_whole(chosen: argparse.Namespace) -> bool:
-    """Whether nothing that docs quote was left out."""
-    partial = chosen.quick or chosen.scenes or chosen.contenders or set(chosen.parts) != set(PARTS)
-    return not partial
+    """Whether these options measure everything that the docs quote, scenes aside."""
+    return not chosen.quick and not chosen.contenders and set(chosen.parts) == set(PARTS)
 
 
 def _batches(rays: Rays, size: int) -> Iterator[tuple[np.ndarray, np.ndarray]]:

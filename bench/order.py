@@ -55,10 +55,10 @@ def main(options: Sequence[str]) -> None:
     """Runs the bench with command-line options."""
     chosen = parse_options(options)
     folder = SceneFolder(chosen.scene_dir)
-    names = folder.check(chosen.scenes)
+    scenes = folder.select(chosen.scenes)
     rows: list[report.Row] = []
     speed: list[report.Row] = []
-    for name in names:
+    for name in scenes.names:
         mesh = folder.load(name)
         trees = {order: _cpu.Bvh(mesh.vertices, mesh.faces, "fast", order) for order in STORED_ORDERS}
         check_same_tree(list(trees.values()), mesh.name)
@@ -77,7 +77,7 @@ def main(options: Sequence[str]) -> None:
     report.print_table(means, ["rays", "order", *RELATIVE], "Geometric means")
     report.print_table(speed, SPEED_COLUMNS, "Speed, relative to the treelet order")
     report.print_table(speed_means, ["rays", "in_flight", "order", "speed"], "Geometric means")
-    whole = not chosen.quick and not chosen.scenes and set(chosen.rays) == set(KINDS)
+    whole = scenes.whole and not chosen.quick and set(chosen.rays) == set(KINDS)
     content = {"rows": rows, "means": means, "speed": speed, "speed_means": speed_means}
     report.save("order", content, draw(rows, speed), chosen.out, whole=whole)
 

@@ -23,7 +23,7 @@ from bench.figures.pareto_figure import draw
 from bench.support import report
 from bench.support.options import scene_parser
 from bench.support.pareto_scenes import COLUMNS as SCENE_COLUMNS
-from bench.support.pareto_scenes import MEAN_COLUMNS, mean_rows, names_of, scene_rows
+from bench.support.pareto_scenes import MEAN_COLUMNS, QUICK_SCENES, SCENES, mean_rows, scene_rows
 from bench.support.scenes import SceneFolder
 from bench.support.timing import QUICK, Effort
 
@@ -53,7 +53,7 @@ def main(options: Sequence[str]) -> None:
     """Runs the bench with command-line options."""
     chosen = parse_options(options)
     folder = SceneFolder(chosen.scene_dir)
-    names = names_of(folder, chosen.scenes, chosen.quick)
+    scenes = folder.select(chosen.scenes, QUICK_SCENES if chosen.quick else SCENES)
     effort = QUICK if chosen.quick else EFFORT
     sweep = [(scale, 0.0) for scale in SCALES] + [(1.0, place) for place in PLACES]
     plain = sweep.index((1.0, 0.0))
@@ -80,9 +80,9 @@ def main(options: Sequence[str]) -> None:
     )
     for name in missing:
         print(f"not here: {name}")
-    scenes = [row for name in names for row in scene_rows(folder.load(name), chosen.quick, effort)]
-    scene_means = mean_rows(scenes)
-    report.print_table(scenes, SCENE_COLUMNS, "On scenes: Mray/s, and what is kept of the speed of fast")
+    on_scenes = [row for name in scenes.names for row in scene_rows(folder.load(name), chosen.quick, effort)]
+    scene_means = mean_rows(on_scenes)
+    report.print_table(on_scenes, SCENE_COLUMNS, "On scenes: Mray/s, and what is kept of the speed of fast")
     report.print_table(scene_means, MEAN_COLUMNS, "Kept of the speed of fast, over scenes and rays")
     cost = float64_cost(speed)
     print(f"float64 / float32, both watertight: {cost['mrays']:.3f} in flight, {cost['single']:.3f} single")
@@ -92,10 +92,10 @@ def main(options: Sequence[str]) -> None:
         "missing": missing,
         "triangles": len(cases[0].faces),
         "float64_to_float32": cost,
-        "scenes": scenes,
+        "scenes": on_scenes,
         "scene_means": scene_means,
     }
-    whole = not chosen.quick and not chosen.scenes
+    whole = scenes.whole and not chosen.quick and not missing
     report.save("pareto", content, draw(means, rows), chosen.out, whole=whole)
 
 

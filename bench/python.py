@@ -37,6 +37,7 @@ from matplotlib import pyplot
 from matplotlib.figure import Figure
 
 SCENES = ("living_room", "bmw_m6", "bathroom_salledebain", "furball_embree_tubes")
+OPTIONAL = {"open3d"}  # a run without it is whole
 RAY_KINDS = ("primary", "diffuse", "random")
 RAYS, QUICK_RAYS = 131_072, 4_096
 # All hits: trimesh casts every ray again from each of its hits.
@@ -57,12 +58,12 @@ def main(options: Sequence[str]) -> None:
     """Runs the bench with command-line options."""
     chosen = parse_options(options)
     folder = SceneFolder(chosen.scene_dir)
-    usual = [name for name in SCENES if name in folder.names()] or folder.names()
+    scenes = folder.select(chosen.scenes, SCENES)
     rows: list[report.Row] = []
     single: list[report.Row] = []
     missing = [f"{name} is not installed" for name in absent()]
     missing += [f"this version of wive has no query for {query}" for query in QUERIES if not answered(query)]
-    for name in folder.check(chosen.scenes or usual):
+    for name in scenes.names:
         mesh = folder.load(name)
         recorded = recorded_rays(mesh)
         ours = Ours(mesh)
@@ -78,7 +79,7 @@ def main(options: Sequence[str]) -> None:
     report.print_table(single, SINGLE_COLUMNS, "One ray: microseconds a call")
     print("".join(f"\n{line}" for line in missing))
     content = {"missing": missing, "rows": rows, "means": means, "single": single}
-    whole = not (chosen.quick or chosen.scenes) and chosen.rays == RAY_KINDS
+    whole = scenes.whole and not chosen.quick and chosen.rays == RAY_KINDS and set(absent()) <= OPTIONAL
     report.save("python", content, draw(means), chosen.out, whole=whole)
 
 

@@ -27,7 +27,8 @@ def main(options: Sequence[str]) -> None:
     chosen = parse_options(options)
     folder = SceneFolder(chosen.scene_dir)
     rows = []
-    for name in folder.check(chosen.scenes):
+    scenes = folder.select(chosen.scenes)
+    for name in scenes.names:
         mesh = folder.load(name)
         recorded = recorded_rays(mesh)
         sets = [recorded[kind].thinned(QUICK_RAYS if chosen.quick else RAYS) for kind in KINDS]
@@ -38,7 +39,7 @@ def main(options: Sequence[str]) -> None:
     }
     report.print_table(rows, COLUMNS, "quality='high' over quality='medium'")
     report.print_table([means], list(means), "Geometric means")
-    whole = not chosen.quick and not chosen.scenes
+    whole = scenes.whole and not chosen.quick
     report.save("quality", {"rows": rows, "means": means}, None, chosen.out, whole=whole)
 
 

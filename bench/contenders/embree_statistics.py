@@ -47,7 +47,7 @@ def embree_statistics(mesh: Mesh, *, isa: Isa, robust: bool, quality: Quality = 
         path = Path(folder) / "mesh.npz"
         np.savez(path, vertices=mesh.vertices, faces=mesh.faces)
         answer = subprocess.run(
-            [sys.executable, "-m", "bench.embree_statistics", str(path), isa, str(int(robust)), quality],
+            [sys.executable, "-m", __name__, str(path), isa, str(int(robust)), quality],
             cwd=Path(__file__).resolve().parents[2], capture_output=True, text=True, check=False,
         )  # fmt: skip
     return parse(answer.stdout, mesh.name, answer.stderr)

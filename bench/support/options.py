@@ -39,9 +39,11 @@ def in_flights(text: str) -> tuple[int, ...]:
 def scene_parser(name: str, description: str | None) -> argparse.ArgumentParser:
     """A parser with what every bench over scenes takes."""
     parser = result_parser(name, description)
-    parser.add_argument("--scenes", type=listed(), default=(), help="names of scenes; all by default")
+    parser.add_argument("--scenes", type=listed(), default=(), help="names of scenes")
     parser.add_argument(
-        "--scene-dir", type=Path, help="folder of scenes; default $WIVE_SCENES or ../shared/scenes"
+        "--scene-dir",
+        type=Path,
+        help="folder of scenes (docs/scenes.md)",
     )
     return parser
 

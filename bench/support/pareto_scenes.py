@@ -6,7 +6,7 @@ from bench.contenders.pareto_contenders import wive_contenders
 from bench.contenders.speeds import speeds
 from bench.support import report
 from bench.support.rays import recorded_rays
-from bench.support.scenes import Mesh, SceneFolder
+from bench.support.scenes import Mesh
 from bench.support.timing import Effort, geometric_mean
 
 SCENES = (
@@ -19,12 +19,6 @@ WAYS = {"mrays": "in flight", "single": "one ray"}
 
 COLUMNS = ["scene", "rays", "contender", "mrays", "single", "kept_mrays", "kept_single"]
 MEAN_COLUMNS = ["contender", "mean_mrays", "lowest_mrays", "mean_single", "lowest_single"]
-
-
-def names_of(folder: SceneFolder, asked: Sequence[str], quick: bool) -> Sequence[str]:
-    """Which scenes to measure: those asked for, else the usual ones that there are."""
-    usual = QUICK_SCENES if quick else [name for name in SCENES if name in folder.names()]
-    return folder.check(asked or usual)
 
 
 def scene_rows(mesh: Mesh, quick: bool, effort: Effort) -> Iterator[report.Row]:

@@ -85,7 +85,7 @@ def save(name: str, content: Row, figure: "Figure | None", folder: Path | None, 
 
 
 def to_json(content: Row) -> str:
-    """JSON with one line per row of a table and one per key of the rest, so that a diff shows what changed."""
+    """JSON with one line per row of a table and per key of the rest, so that a diff shows what changed."""
     return _json(content, 0) + "\n"
 
 

@@ -3,6 +3,7 @@
 import json
 import os
 import re
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,11 +13,20 @@ from numpy.typing import NDArray
 
 from bench.contenders.compiled_shim import BenchError
 
-DEFAULT_FOLDER = Path(__file__).resolve().parents[3] / "shared" / "scenes"
-TERRAIN = "terrain_jacksboro"
+BESIDE_REPOSITORY = Path(__file__).resolve().parents[3] / "shared"
+DEFAULT_FOLDERS = (BESIDE_REPOSITORY / "scenes", BESIDE_REPOSITORY / "scenes_more")
+TERRAIN = "terrain_jacksboro"  # made of matplotlib's elevations if no file has it
 TERRAIN_SPACING = 30.0  # metres between the elevation model's samples, about one arc second
 
-# Scenes made of others: NAME_tiled_4x4, and terrain_1000k of about a million triangles.
+# The scenes that the docs quote results of, smallest first; docs/scenes.md says where each comes from.
+SCENES = (
+    "living_room", "kitchen_fatih", "terrain_jacksboro", "staircase", "city_san_francisco", "veach_ajar",
+    "bathroom_contemporary", "bmw_m6", "transparent_machines_f542", "bathroom_salledebain",
+    "furball_embree_tubes",
+)  # fmt: skip
+LARGEST = "furball_embree_tubes_tiled_2x2"  # 10.9 million triangles
+
+# Scenes derived from others: NAME_tiled_4x4, and terrain_1000k of about a million triangles.
 TILED = re.compile(r"(?P<base>.+)_tiled_(?P<columns>\d+)x(?P<rows>\d+)")
 RESAMPLED = re.compile(r"terrain_(?P<thousands>\d+)k")
 TILE_PITCH = 1.05  # distance of neighbouring tiles over their size,
@@ -52,57 +62,84 @@ class Mesh:
         return float(np.linalg.norm(np.ptp(self.vertices.astype(np.float64), axis=0)))
 
 
+@dataclass(frozen=True)
+class Selection:
+    """The scenes of one run, and those that the bench measures by default but this machine lacks."""
+
+    names: list[str]
+    missing: list[str]
+    by_default: bool
+
+    @property
+    def whole(self) -> bool:
+        """Whether they are all the scenes that the bench measures by default."""
+        return self.by_default and not self.missing
+
+
 class SceneFolder:
-    """A folder of NAME.npz (vertices, faces) and cameras.json; where there is none, matplotlib's terrain."""
+    """Folders of NAME.npz (vertices, faces), each with a cameras.json; terrain needs only matplotlib."""
 
     def __init__(self, folder: Path | None = None) -> None:
-        """Folder: the one given, else $WIVE_SCENES, else ../shared/scenes beside the repository."""
-        named = folder or (Path(os.environ["WIVE_SCENES"]) if os.environ.get("WIVE_SCENES") else None)
-        chosen = named or DEFAULT_FOLDER
-        self.folder = chosen if (chosen / "cameras.json").is_file() else None
-        if named is not None and self.folder is None:
-            raise BenchError(f"no cameras.json in the scene folder {named}")
-        self._cameras: dict[str, dict[str, object]] = {}
-        if self.folder is not None:
-            self._cameras = json.loads((self.folder / "cameras.json").read_text())
+        """Reads the folder given, else those of $WIVE_SCENES, else shared/scenes beside the repository."""
+        named = [folder] if folder else [Path(part) for part in _environment_folders()]
+        for candidate in named:
+            if not (candidate / "cameras.json").is_file():
+                raise BenchError(f"no cameras.json in the scene folder {candidate}")
+        self._files: dict[str, Path] = {}
+        self._cameras: dict[str, Camera] = {TERRAIN: TERRAIN_CAMERA}
+        for candidate in named or DEFAULT_FOLDERS:
+            if (candidate / "cameras.json").is_file():
+                for name, camera in json.loads((candidate / "cameras.json").read_text()).items():
+                    if (candidate / f"{name}.npz").is_file():
+                        self._files[name] = candidate / f"{name}.npz"
+                        self._cameras[name] = Camera(**camera)
 
     def names(self) -> list[str]:
-        """Every scene, smallest file first."""
-        if self.folder is None:
-            return [TERRAIN]
-        files = [self.folder / f"{name}.npz" for name in self._cameras]
-        return [file.stem for file in sorted(files, key=lambda file: file.stat().st_size) if file.is_file()]
+        """Every scene that is here, those of the docs first."""
+        return [name for name in dict.fromkeys((*SCENES, *self._cameras)) if name in self._cameras]
 
-    def largest(self) -> str:
-        """Name of a scene of more than ten million triangles."""
-        furball = "furball_embree_tubes"
-        return f"{furball}_tiled_2x2" if furball in self.names() else f"{TERRAIN}_tiled_7x7"
+    def select(self, asked: Sequence[str], usual: Sequence[str] = SCENES) -> Selection:
+        """The scenes asked for, or else those of the usual ones that are here; says which are missing.
 
-    def check(self, names: Sequence[str]) -> list[str]:
-        """The names, or all where there are none; BenchError for one that there is no scene of."""
-        for name in names:
-            if not self._has(name):
-                known = ", ".join(self.names())
-                raise BenchError(f"no scene {name!r}: there are {known}, NAME_tiled_4x4 and terrain_1000k")
-        return list(names) or self.names()
+        Raises BenchError if a scene asked for is missing, or every usual one.
+        """
+        missing = [name for name in asked or usual if not self._has(name)]
+        if asked and missing:
+            known = ", ".join(self.names())
+            raise BenchError(f"no scene {missing[0]!r}: there are {known}, NAME_tiled_4x4 and terrain_1000k")
+        if missing:
+            print(
+                f"missing scenes: {', '.join(missing)}\nA run without them is partial. docs/scenes.md says "
+                "where they come from; put them into shared/scenes beside the repository or $WIVE_SCENES.",
+                file=sys.stderr,
+            )
+        names = [name for name in asked or usual if name not in missing]
+        if not names:
+            raise BenchError("none of the scenes that this bench measures is here")
+        return Selection(names, missing, by_default=not asked)
 
     def _has(self, name: str) -> bool:
         tiles = TILED.fullmatch(name)
-        return self._has(tiles["base"]) if tiles else name in self.names() or bool(RESAMPLED.fullmatch(name))
+        return self._has(tiles["base"]) if tiles else name in self._cameras or bool(RESAMPLED.fullmatch(name))
 
     def load(self, name: str) -> Mesh:
         """The mesh of that name: a scene, NAME_tiled_4x4 of its copies, or terrain of so many triangles."""
-        self.check([name])
+        self.select([name])
         if size := RESAMPLED.fullmatch(name):
             return terrain(int(size["thousands"]) * 1000)
         if tiles := TILED.fullmatch(name):
             return tiled(self.load(tiles["base"]), int(tiles["columns"]), int(tiles["rows"]))
-        if self.folder is None:
+        if name not in self._files:
             return terrain()
-        with np.load(self.folder / f"{name}.npz") as arrays:
+        with np.load(self._files[name]) as arrays:
             vertices = np.ascontiguousarray(arrays["vertices"], dtype=np.float32)
             faces = np.ascontiguousarray(arrays["faces"], dtype=np.int32)
-        return Mesh(name, vertices, faces, Camera(**self._cameras[name]))  # type: ignore[arg-type]
+        return Mesh(name, vertices, faces, self._cameras[name])
+
+
+def _environment_folders() -> list[str]:
+    """The folders of $WIVE_SCENES, separated like those of $PATH."""
+    return [part for part in os.environ.get("WIVE_SCENES", "").split(os.pathsep) if part]
 
 
 def terrain(triangles: int | None = None) -> Mesh:
