@@ -16,8 +16,7 @@ import matplotlib
 from bench.contenders.build_race import build_rows, tree_row
 from bench.contenders.native_embree import Isa
 from bench.support import report
-from bench.support.features import QUALITIES, qualities
-from bench.support.options import listed, numbers, scene_parser
+from bench.support.options import QUALITIES, listed, numbers, scene_parser
 from bench.support.scenes import SceneFolder
 from bench.support.timing import Effort, core_count
 from wive import _cpu
@@ -63,17 +62,17 @@ def main(options: Sequence[str]) -> None:
         mesh = folder.load(name)
         rounds = max(FEWEST_ROUNDS, min(MOST_ROUNDS, TRIANGLES_BUILT // len(mesh.faces)))
         effort = QUICK_EFFORT if chosen.quick else Effort(least=min(7, rounds), most=rounds)
-        for quality in qualities(chosen.quality):
+        for quality in chosen.quality or QUALITIES:
             if quality == "high" and len(mesh.faces) > LARGEST_HIGH and not chosen.quality:
                 continue
-            for row in build_rows(mesh, "watertight", isa, chosen.threads, effort, quality):  # type: ignore[arg-type]
+            for row in build_rows(mesh, "watertight", isa, chosen.threads, effort, quality):
                 for side in ("wive", "embree"):
                     row[f"{side}_ns_per_triangle"] = row[f"{side}_seconds"] / len(mesh.faces) * 1e9
                 build.append(row)
                 report.print_progress(
                     row, ("scene", "triangles", "quality", "threads", "ratio", "wive_seconds")
                 )
-            trees.append(tree_row(mesh, "watertight", isa, quality))  # type: ignore[arg-type]
+            trees.append(tree_row(mesh, "watertight", isa, quality))
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20
     report.print_table(build, COLUMNS, "Building, equal threads: Embree's seconds over wive's")
     report.print_table(
@@ -135,7 +134,5 @@ def parse_options(options: Sequence[str]) -> argparse.Namespace:
     parser.add_argument(
         "--threads", type=numbers, default=default_threads(), help="numbers of threads, e.g. 1,2"
     )
-    parser.add_argument(
-        "--quality", type=listed(QUALITIES), default=(), help="build qualities; all this build has"
-    )
+    parser.add_argument("--quality", type=listed(QUALITIES), default=(), help="build qualities")
     return parser.parse_args(options)

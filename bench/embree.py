@@ -17,14 +17,12 @@ from bench.contenders.compiled_shim import BenchError
 from bench.contenders.embree_race import TUNED, Contender, speed_rows
 from bench.figures.embree_figure import draw
 from bench.support import report
-from bench.support.features import NODES, node_forms
-from bench.support.options import in_flights, listed, scene_parser
+from bench.support.options import ACCURACIES, NODES, in_flights, listed, scene_parser
 from bench.support.rays import KINDS, recorded_rays
 from bench.support.scenes import LARGEST, SCENES, SceneFolder
 from bench.support.timing import QUICK, Effort, geometric_mean
 from wive import _cpu
 
-ACCURACIES = ("fast", "watertight")
 KERNELS = ("avx512", "avx2")
 PARTS = ("speed", "build", "tree")
 BUILD_THREADS = (1, 2)
@@ -55,10 +53,9 @@ def main(options: Sequence[str]) -> None:
     folder = SceneFolder(chosen.scene_dir)
     scenes = folder.select(chosen.scenes, (*SCENES, LARGEST))
     kernels = usable_kernels(chosen.kernels)
-    forms = node_forms(chosen.nodes)
-    ways = product(kernels, chosen.in_flight, forms)
+    ways = product(kernels, chosen.in_flight, chosen.nodes)
     # Other node forms are told apart by memory, not by instruction set: the first kernel speaks for all.
-    contenders = [Contender(*way) for way in ways if way[0] == kernels[0] or way[2] == forms[0]]
+    contenders = [Contender(*way) for way in ways if way[0] == kernels[0] or way[2] == chosen.nodes[0]]
     speed: list[report.Row] = []
     build: list[report.Row] = []
     trees: list[report.Row] = []
@@ -147,7 +144,7 @@ def parse_options(options: Sequence[str]) -> argparse.Namespace:
     parser.add_argument(
         "--in-flight", type=in_flights, default=IN_FLIGHT, help="rays interleaved per thread, e.g. 1,32,tuned"
     )
-    parser.add_argument("--nodes", type=listed(NODES), default=(), help="node forms; all this build has")
+    parser.add_argument("--nodes", type=listed(NODES), default=NODES, help=", ".join(NODES))
     parser.add_argument("--accuracy", type=listed(ACCURACIES), default=ACCURACIES, help=", ".join(ACCURACIES))
     parser.add_argument("--rays", type=listed(KINDS), default=KINDS, help=", ".join(KINDS))
     parser.add_argument("--parts", type=listed(PARTS), default=PARTS, help=", ".join(PARTS))
@@ -161,9 +158,10 @@ def is_whole(chosen: argparse.Namespace, kernels: Sequence[str]) -> bool:
     """Whether these options and kernels measure everything that the docs quote, scenes aside."""
     everything = {
         "in_flight": IN_FLIGHT,
+        "nodes": NODES,
         "accuracy": ACCURACIES,
         "rays": KINDS,
         "parts": PARTS,
     }
     complete = all(set(getattr(chosen, name)) >= set(values) for name, values in everything.items())
-    return complete and set(kernels) >= set(KERNELS) and not chosen.quick and not chosen.nodes
+    return complete and set(kernels) >= set(KERNELS) and not chosen.quick

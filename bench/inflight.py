@@ -18,8 +18,7 @@ import numpy as np
 
 from bench.contenders.compiled_shim import BenchError, compiled
 from bench.support import report
-from bench.support.features import Accuracy, build_tree
-from bench.support.options import listed, numbers, scene_parser
+from bench.support.options import ACCURACIES, listed, numbers, scene_parser
 from bench.support.rays import KINDS, Rays, recorded_rays
 from bench.support.scenes import LARGEST, Mesh, SceneFolder
 from bench.support.timing import Effort, compare_in_turn, one_core, timed
@@ -57,7 +56,7 @@ def main(options: Sequence[str]) -> None:
         mesh = folder.load(name)
         recorded = recorded_rays(mesh)
         sets = [recorded[kind].thinned(QUICK_RAYS if chosen.quick else RAYS) for kind in chosen.rays]
-        tree = build_tree(mesh, chosen.accuracy)
+        tree = _cpu.Bvh(mesh.vertices, mesh.faces, chosen.accuracy)
         for rays in sets:
             for row in ray_rows(mesh, tree, chosen.kernel or best_kernel(), rays, chosen, latency):
                 rows.append(row)
@@ -186,10 +185,9 @@ def draw(rows: Sequence[report.Row]) -> Figure:
 
 def parse_options(options: Sequence[str]) -> argparse.Namespace:
     """The command line's choices."""
-    accuracies: tuple[Accuracy, ...] = ("fast", "watertight")
     parser = scene_parser("inflight", __doc__)
     parser.add_argument("--in-flight", type=numbers, default=IN_FLIGHT, help="numbers of rays, e.g. 1,8,24")
     parser.add_argument("--rays", type=listed(KINDS), default=RAY_KINDS, help=", ".join(KINDS))
     parser.add_argument("--kernel", help="one of wive's kernels; default: the best here")
-    parser.add_argument("--accuracy", choices=accuracies, default="watertight", help="of wive's kernels")
+    parser.add_argument("--accuracy", choices=ACCURACIES, default="watertight", help="of wive's kernels")
     return parser.parse_args(options)

@@ -28,8 +28,7 @@ from bench.contenders.embree_race import TUNED, Contender, embree_tree
 from bench.contenders.native_embree import EmbreeMesh
 from bench.embree import usable_kernels
 from bench.support import report
-from bench.support.features import Accuracy, build_tree
-from bench.support.options import in_flights, listed, scene_parser
+from bench.support.options import ACCURACIES, Accuracy, in_flights, listed, scene_parser
 from bench.support.scenes import Mesh, SceneFolder
 from bench.support.timing import Comparison, geometric_mean, one_core
 from wive import _cpu
@@ -46,7 +45,6 @@ ROWS, QUICK_ROWS = 10, 4
 SAMPLES = 16
 KERNELS = ("avx512.half", "avx512.full", "avx2")  # the paper's two, and full on AVX-512
 IN_FLIGHT = (1, TUNED)
-ACCURACIES: tuple[Accuracy, ...] = ("fast", "watertight")
 # Pictures and rays that differ by more than this share are no longer the same work: says so.
 LARGEST_DIFFERENCE = 0.01
 
@@ -98,7 +96,7 @@ def scene_rows(
     mesh: Mesh, accuracy: Accuracy, contenders: Sequence[Contender], chosen: argparse.Namespace
 ) -> Iterator[report.Row]:
     """One row of results per contender."""
-    tree = build_tree(mesh, accuracy)
+    tree = _cpu.Bvh(mesh.vertices, mesh.faces, accuracy)
     for isa in dict.fromkeys(contender.isa for contender in contenders):
         with embree_tree(mesh, accuracy, isa) as theirs:
             theirs.commit()

@@ -15,7 +15,7 @@ from collections.abc import Iterator, Sequence
 import matplotlib
 import numpy as np
 
-from bench.contenders.python_callers import ALL, QUERIES, SCENE, Caller, Ours, absent, answered, others
+from bench.contenders.python_callers import ALL, QUERIES, SCENE, Caller, Ours, absent, others
 from bench.latency import QUICK_SECONDS, measured
 from bench.support import report
 from bench.support.options import listed, scene_parser
@@ -62,12 +62,11 @@ def main(options: Sequence[str]) -> None:
     rows: list[report.Row] = []
     single: list[report.Row] = []
     missing = [f"{name} is not installed" for name in absent()]
-    missing += [f"this version of wive has no query for {query}" for query in QUERIES if not answered(query)]
     for name in scenes.names:
         mesh = folder.load(name)
         recorded = recorded_rays(mesh)
         ours = Ours(mesh)
-        rivals = [other for other in others(mesh) if answered(other.query)]
+        rivals = list(others(mesh))
         for kind in chosen.rays:
             for row in speed_rows(mesh, ours, rivals, recorded[kind], chosen.quick):
                 rows.append(row)
@@ -134,7 +133,7 @@ def single_rows(
     mesh: Mesh, ours: Ours, rivals: Sequence[Caller], recorded: Rays, quick: bool
 ) -> Iterator[report.Row]:
     """One row per caller, ours for every query there is."""
-    callers = [*(ours.by_scene(query, 1) for query in QUERIES if answered(query)), *rivals]
+    callers = [*(ours.by_scene(query, 1) for query in QUERIES), *rivals]
     callers += [caller for rival in rivals for caller in ours.counterparts(rival, 1) if caller.name != SCENE]
     parts = [(recorded.origins[i : i + 1], recorded.directions[i : i + 1]) for i in range(SINGLE_RAYS)]
     for caller in callers:

@@ -5,11 +5,12 @@ from collections.abc import Iterator, Sequence
 
 from bench.contenders.embree_race import embree_tree, quartiles
 from bench.contenders.embree_statistics import embree_statistics
-from bench.contenders.native_embree import Isa, Quality, trim_heap
-from bench.support.features import Accuracy, build_tree
+from bench.contenders.native_embree import Isa, trim_heap
+from bench.support.options import Accuracy, Quality
 from bench.support.report import Row
 from bench.support.scenes import Mesh
 from bench.support.timing import Comparison, Effort, compare, core_count
+from wive import _cpu
 
 WARMED_UP = 4_000_000  # triangles from which a build takes so long that the first is like any other
 
@@ -43,7 +44,7 @@ def _compare_builds(
     def our_seconds() -> float:
         trim_heap()
         start = time.perf_counter()
-        tree = build_tree(mesh, accuracy, quality=quality, threads=threads)
+        tree = _cpu.Bvh(mesh.vertices, mesh.faces, accuracy, quality=quality, threads=threads)
         seconds = time.perf_counter() - start
         del tree  # freeing is not building
         return seconds
@@ -64,7 +65,7 @@ def tree_row(mesh: Mesh, accuracy: Accuracy, isa: Isa, quality: Quality = "mediu
 
     The ratio of bytes is against what Embree uses; `embree_allocated` is what it holds for that.
     """
-    ours = build_tree(mesh, accuracy, quality=quality)
+    ours = _cpu.Bvh(mesh.vertices, mesh.faces, accuracy, quality=quality)
     inner, leaves = ours.sah
     theirs = embree_statistics(mesh, isa=isa, robust=accuracy == "watertight", quality=quality)
     with embree_tree(mesh, accuracy, isa, core_count(), quality) as tree:

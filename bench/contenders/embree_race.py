@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.contenders.native_embree import EmbreeMesh, Isa, Quality, flushed_denormals
-from bench.support.features import Accuracy, build_tree
+from bench.support.options import Accuracy, Nodes
 from bench.support.rays import Rays
 from bench.support.report import Row
 from bench.support.scenes import Mesh
@@ -24,7 +24,7 @@ class Contender:
 
     kernel: str
     in_flight: int = 1
-    nodes: str = "float32"
+    nodes: Nodes = "float32"
 
     @property
     def isa(self) -> Isa:
@@ -51,7 +51,7 @@ def speed_rows(
 ) -> Iterator[Row]:
     """One row per contender and set of rays, both sides on one pinned core."""
     forms = dict.fromkeys(contender.nodes for contender in contenders)
-    ours = {nodes: build_tree(mesh, accuracy, nodes=nodes) for nodes in forms}
+    ours = {nodes: _cpu.Bvh(mesh.vertices, mesh.faces, accuracy, nodes=nodes) for nodes in forms}
     for isa in dict.fromkeys(contender.isa for contender in contenders):
         cases = list(product([one for one in contenders if one.isa == isa], sets))
         with embree_tree(mesh, accuracy, isa) as theirs:

@@ -36,11 +36,6 @@ class Caller:
     options: dict[str, bool] = field(default_factory=dict)
 
 
-def answered(query: str) -> bool:
-    """Whether this version of wive has such a query."""
-    return query != ALL or hasattr(wive.Scene, "intersect_all")
-
-
 class Ours:
     """wive's answer to every query, on a number of threads: by a scene and by the intersector for trimesh."""
 
@@ -53,7 +48,7 @@ class Ours:
     def counterparts(self, rival: Caller, threads: int) -> Iterator[Caller]:
         """What a user would call in place of a rival."""
         yield self.by_scene(rival.query, threads)
-        if rival.method and importlib.util.find_spec("wive.trimesh"):
+        if rival.method:
             bound = getattr(self._drop_in(threads), rival.method)
             call = partial(bound, **rival.options)
             yield Caller("wive.trimesh", rival.query, call, rival.hits)

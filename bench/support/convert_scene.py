@@ -10,6 +10,7 @@ import argparse
 import json
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,6 +38,7 @@ def parts(source: Path) -> list[tuple[NDArray[np.float64], NDArray[np.int64]]]:
     """Vertices and triangles of each part of a file, in the file's own coordinates."""
     import trimesh
 
+    scene: Any
     try:
         scene = trimesh.load(source, force="scene", process=False)
     except (ValueError, NotImplementedError) as problem:

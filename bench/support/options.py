@@ -3,6 +3,15 @@
 import argparse
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Literal
+
+Accuracy = Literal["fast", "watertight"]
+Nodes = Literal["float32", "compressed"]
+Quality = Literal["medium", "high"]
+
+ACCURACIES: tuple[Accuracy, ...] = ("fast", "watertight")  # those that Embree has a counterpart to
+NODES: tuple[Nodes, ...] = ("float32", "compressed")
+QUALITIES: tuple[Quality, ...] = ("medium", "high")
 
 
 def listed(choices: Sequence[str] = ()) -> Callable[[str], tuple[str, ...]]:

@@ -24,6 +24,7 @@ Row = dict[str, Any]
 def environment() -> Row:
     """The machine and the versions that numbers were taken on."""
     import wive
+    from wive import _cpu
 
     return {
         "date": datetime.datetime.now(datetime.timezone.utc).isoformat(timespec="seconds"),
@@ -32,7 +33,7 @@ def environment() -> Row:
         "system": f"{platform.system()} {platform.release()} {platform.machine()}",
         "python": platform.python_version(),
         "wive": wive.__version__,
-        "wive_compiler": _core_compiler(),
+        "wive_compiler": _cpu.compiler,
         "numpy": importlib.metadata.version("numpy"),
         "embreex": _or_none(embreex_version),
         "shim_compiler": _or_none(compiler_version),
@@ -120,13 +121,6 @@ def _or_none(function: Any) -> Any:
         return function()
     except (BenchError, importlib.metadata.PackageNotFoundError):
         return None
-
-
-def _core_compiler() -> str | None:
-    from wive import _cpu
-
-    compiler = getattr(_cpu, "compiler", None)
-    return str(compiler() if callable(compiler) else compiler) if compiler is not None else None
 
 
 def _proc_cpuinfo(field: str) -> str | None:
