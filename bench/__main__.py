@@ -4,10 +4,12 @@ import importlib
 import sys
 from pathlib import Path
 
-MODULES = {"convert": "support.convert_scene"}  # of commands that are not called like their module
+# Modules of the commands that have another name.
+MODULES = {"convert": "support.convert_scene", "gpu": "gpu.run", "gpu-prepare": "gpu.prepare"}
 BENCHES = {
     "build": "build time, SAH and memory against native Embree, from 100 thousand to 20 million triangles",
     "embree": "single rays against native Embree: speed, build time, SAH, memory",
+    "gpu": "wive's Warp kernels on a GPU: the core's bits, speed against Warp's own query, streams",
     "inflight": "speed and latency over the rays in flight, and what memory's latency allows",
     "latency": "seconds of a call over batch sizes: every backend, wp.mesh_query_ray, embreex",
     "order": "steps per ray for five orders of visiting a node's children, and their speed",
@@ -15,6 +17,7 @@ BENCHES = {
     "pareto": "speed against leaks, wrong triangles and the error of t, with Embree and Warp",
     "python": "what a Python user sees: embreex, trimesh, Warp and wive, NumPy in and out",
     "quality": 'what quality="high" saves in steps per ray and costs in build time',
+    "gpu-prepare": "not a bench: packs Warp and scenes for a GPU machine without a package index",
     "quote": "not a bench: writes the tables of docs/benchmarks.md from bench/results",
     "convert": "not a bench: makes a scene file of meshes in other formats",
 }
@@ -28,7 +31,7 @@ def main() -> int:
         if name not in ("-h", "--help"):
             print(f"bench: no bench {name!r}", file=sys.stderr)
         print("usage: python -m bench NAME [--help | options]\n")
-        print("\n".join(f"  {known:8} {what}" for known, what in BENCHES.items()))
+        print("\n".join(f"  {known:11} {what}" for known, what in BENCHES.items()))
         return 0 if name in ("-h", "--help") else 2
     from bench.contenders.compiled_shim import BenchError
 

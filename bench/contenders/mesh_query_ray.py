@@ -1,4 +1,4 @@
-"""Warp's own closest-hit query, `wp.mesh_query_ray`, over a batch of rays."""
+"""Warp's own queries, `wp.mesh_query_ray` and `wp.mesh_query_ray_anyhit`, over a batch of rays."""
 
 # mypy: disable-error-code="untyped-decorator"
 
@@ -10,17 +10,19 @@ from bench.support.scenes import Mesh
 
 wp.set_module_options({"enable_backward": False})
 
+BLOCK = 256  # threads per block, Warp's default
+
 
 class MeshQuery:
-    """A mesh with Warp's best tree, on one device."""
+    """A mesh with one of Warp's trees, on one device."""
 
-    def __init__(self, mesh: Mesh, device: str) -> None:
-        """Build by the surface-area heuristic: the default on CUDA builds faster and traces slower."""
+    def __init__(self, mesh: Mesh, device: str, builder: str = "sah") -> None:
+        """Builds by the surface-area heuristic: Warp's default on CUDA builds faster and traces slower."""
         self.device = device
         self.mesh = wp.Mesh(
             points=wp.array(mesh.vertices, dtype=wp.vec3, device=device),
             indices=wp.array(mesh.faces.ravel(), dtype=wp.int32, device=device),
-            bvh_constructor="sah",
+            bvh_constructor=builder,
         )
 
     def outputs(self, count: int) -> tuple[Any, Any, Any]:
@@ -29,10 +31,16 @@ class MeshQuery:
         prim = wp.empty(count, dtype=wp.int32, device=self.device)
         return t, prim, wp.empty(count, dtype=wp.vec2, device=self.device)
 
-    def launch(self, origins: Any, directions: Any, t: Any, prim: Any, uv: Any) -> None:
+    def launch(
+        self, origins: Any, directions: Any, t: Any, prim: Any, uv: Any, block_dim: int = BLOCK
+    ) -> None:
         """Closest hits of rays (n,) vec3 into t, prim and uv; t inf and prim -1 on a miss."""
         inputs = [self.mesh.id, origins, directions]
-        wp.launch(_closest, len(origins), inputs, [t, prim, uv], device=self.device)
+        wp.launch(_closest, len(origins), inputs, [t, prim, uv], device=self.device, block_dim=block_dim)
+
+    def launch_any(self, origins: Any, directions: Any, occluded: Any) -> None:
+        """Whether rays (n,) vec3 hit anything, into occluded (n,) bool."""
+        wp.launch(_any, len(origins), [self.mesh.id, origins, directions], [occluded], device=self.device)
 
 
 @wp.kernel
@@ -49,3 +57,14 @@ def _closest(
     t[i] = wp.where(hit.result, hit.t, wp.inf)
     prim[i] = wp.where(hit.result, hit.face, -1)
     uv[i] = wp.vec2(hit.u, hit.v)
+
+
+@wp.kernel
+def _any(
+    mesh: wp.uint64,
+    origins: wp.array[wp.vec3],
+    directions: wp.array[wp.vec3],
+    occluded: wp.array[wp.bool],
+) -> None:
+    i = wp.tid()
+    occluded[i] = wp.mesh_query_ray_anyhit(mesh, origins[i], directions[i], wp.inf)

@@ -74,15 +74,25 @@ def save(name: str, content: Row, figure: "Figure | None", folder: Path | None, 
     They go into the folder given; else a whole run's go into bench/results and a partial one's into the
     cache, so that it never replaces results that the docs quote.
     """
-    folder = folder or (RESULTS if whole else cache_folder() / "partial")
-    folder.mkdir(parents=True, exist_ok=True)
+    folder = folder or (RESULTS if whole else partial_folder())
     path = folder / f"{name}.json"
-    path.write_text(to_json({"bench": name, "environment": environment(), **content}))
+    write(path, {"bench": name, "environment": environment(), **content})
     print(f"\nwrote {path}")
     if figure is not None:
         figure.savefig(path.with_suffix(".png"), dpi=130)
         print(f"wrote {path.with_suffix('.png')}")
     return path
+
+
+def partial_folder() -> Path:
+    """The folder for partial runs."""
+    return cache_folder() / "partial"
+
+
+def write(path: Path, content: Row) -> None:
+    """Writes the content as JSON, and its folder if there is none."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(to_json(content))
 
 
 def to_json(content: Row) -> str:
@@ -150,9 +160,11 @@ def _commit() -> str | None:
     """HEAD's hash, with "+" where the tree has changes that are not in it."""
 
     def git(*arguments: str) -> str | None:
-        answer = subprocess.run(
-            ["git", "-C", str(REPOSITORY), *arguments], capture_output=True, text=True, check=False
-        )
+        command = ["git", "-C", str(REPOSITORY), *arguments]
+        try:
+            answer = subprocess.run(command, capture_output=True, text=True, check=False)
+        except OSError:
+            return None
         return answer.stdout.strip() if answer.returncode == 0 else None
 
     head = git("rev-parse", "HEAD")
