@@ -11,19 +11,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+from support.exact_answers import INFINITE, ZERO, truth_of, wrong_rays
 from support.hard_sets import SETS, HardSet, hard_set
 from support.oracle import Truth, integers, meetings, truth, unit_of
 
 import wive
 from wive import _cpu
 
-ZERO, INFINITE = np.zeros(1, np.float32), np.full(1, np.inf, np.float32)
 CPU_KERNELS = [name for name, reason in _cpu.kernels().items() if not reason]
-
-
-@functools.cache
-def truth_of(name: str) -> Truth:
-    return truth(*hard_set(name), ZERO, INFINITE)
 
 
 def answers(
@@ -41,13 +36,6 @@ def answers(
     )
     hits = scene.intersect(*arguments)
     return Truth(hits.t, hits.prim, hits.uv, scene.occluded(*arguments))
-
-
-def wrong_rays(found: Truth, right: Truth) -> np.ndarray:
-    """The rays whose answers are not the right bits; a NaN is as good as another."""
-    uv = (found.uv.view(np.uint32) == right.uv.view(np.uint32)) | (np.isnan(found.uv) & np.isnan(right.uv))
-    same = (found.t.view(np.uint32) == right.t.view(np.uint32)) & (found.prim == right.prim) & uv.all(axis=1)
-    return np.flatnonzero(~(same & (found.occluded == right.occluded)))
 
 
 @pytest.mark.parametrize("name", SETS)

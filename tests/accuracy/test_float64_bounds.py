@@ -6,8 +6,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 from support.doubles import CPU, UTM, survey
-from support.meshes import TRIANGLE
-from test_error_bound import (
+from support.error_bounds import (
     COUNT,
     SETS,
     Set,
@@ -19,7 +18,17 @@ from test_error_bound import (
     random_triangles,
     traced,
 )
-from test_spawn import EXPONENTS, SLIVERS, TRANSLATED, hits_of, leave, own_hits, triangles, ways_out
+from support.meshes import TRIANGLE
+from support.spawned_rays import (
+    EXPONENTS,
+    SLIVERS,
+    TRANSLATED,
+    hits_of,
+    leave,
+    own_hits,
+    triangles,
+    ways_out,
+)
 
 import wive
 from wive._internal import error_bounds, spawn

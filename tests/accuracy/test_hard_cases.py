@@ -10,11 +10,10 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from support.closed_meshes import SHAPES, leaving, nearness, placed, utm_terrain
+from support.closed_meshes import DIRECTIONS, SHAPES, grid, leaving, nearness, placed, utm_terrain
+from support.exact_answers import INFINITE, ZERO, truth_of, wrong_rays
 from support.hard_sets import SETS, HardSet, few_bits, hard_set
 from support.oracle import Truth, truth
-from test_exact import INFINITE, ZERO, truth_of, wrong_rays
-from test_watertight import DIRECTIONS, grid
 
 import wive
 from wive import _cpu

@@ -4,11 +4,10 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
-from support.closed_meshes import TETRAHEDRON, leaving, placed
+from support.closed_meshes import SCALES, TETRAHEDRON, grid, leaving, placed
 from support.meshes import soup, sphere
 from support.oracle import nearest_float
 from support.pairs import exact_distances, exact_prims
-from test_watertight import SCALES, grid
 
 import wive
 

@@ -6,10 +6,9 @@ double, where an end point is rounded, so that only parity can be compared, not 
 
 import numpy as np
 import pytest
-from support.closed_meshes import TETRAHEDRON, leaving, placed
+from support.closed_meshes import TETRAHEDRON, grid, leaving, placed
 from support.meshes import sphere
-from test_exact_crossings import surface_rays, voxels
-from test_watertight import grid
+from support.voxels import surface_rays, voxels
 
 import wive
 

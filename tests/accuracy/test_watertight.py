@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
+from support.closed_meshes import DIRECTIONS, SCALES, grid
 from support.meshes import sphere
 
 import wive
 
 PLACES = [(0.0, 0.0, 0.0), (148376.0, 1234.0, -223423.0), (-3e6, 2e6, 1e6)]
-SCALES = [1e-6, 1e-3, 1.0, 1e3, 1e6]
 RAYS = 20_000
 
 
@@ -73,28 +73,6 @@ def test_fast_mode_does_leak_so_these_rays_can_tell(backend: str) -> None:
     assert leaks > 0
 
 
-def grid(size: int) -> tuple[np.ndarray, np.ndarray]:
-    """A closed box [0, size]^3 whose six sides are integer grids of two triangles a cell."""
-    corners: dict[tuple[int, int, int], int] = {}
-    faces: list[list[int]] = []
-
-    def corner(point: np.ndarray) -> int:
-        return corners.setdefault(tuple(int(x) for x in point), len(corners))
-
-    for axis in range(3):
-        u, v = np.eye(3, dtype=int)[[(axis + 1) % 3, (axis + 2) % 3]]
-        for side in (0, size):
-            base = side * np.eye(3, dtype=int)[axis]
-            for i in range(size):
-                for j in range(size):
-                    a, b, c, d = (
-                        corner(base + x * u + y * v)
-                        for x, y in ((i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1))
-                    )
-                    faces += [[a, b, c], [a, c, d]] if side else [[a, c, b], [a, d, c]]
-    return np.array(list(corners), np.float32), np.array(faces, np.int32)
-
-
 def test_axis_rays_through_grid_vertices_cross_the_box_exactly(backend: str) -> None:
     vertices, faces = grid(8)
     scene = wive.Scene(vertices, faces, backend=backend)
@@ -105,13 +83,6 @@ def test_axis_rays_through_grid_vertices_cross_the_box_exactly(backend: str) -> 
             directions = np.zeros_like(origins)
             directions[:, axis] = sign
             assert (scene.intersect(origins, directions).t == 5).all()
-
-
-COMPONENTS = (-1.0, -0.0, 0.0, 1.0)
-DIRECTIONS = np.array(
-    [(x, y, z) for x in COMPONENTS for y in COMPONENTS for z in COMPONENTS if (x, y, z) != (0, 0, 0)],
-    np.float32,
-)
 
 
 def test_signed_zeros_and_axis_directions_all_hit_from_inside(backend: str) -> None:

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from support.float32_trees import leaf_blocks, planes, used_lanes, walk
 from support.meshes import assert_same_hits, random_rays, soup, sphere
-from test_tree import leaf_blocks, planes, used_lanes, walk
 
 import wive
 from wive import _cpu

@@ -1,11 +1,41 @@
 """Closed meshes at any place and scale, rays that leave them at vertices and edges, and a terrain in UTM."""
 
 import numpy as np
-from test_watertight import grid
 
 from support.meshes import sphere
 
 Mesh = tuple[np.ndarray, np.ndarray]
+
+SCALES = [1e-6, 1e-3, 1.0, 1e3, 1e6]
+COMPONENTS = (-1.0, -0.0, 0.0, 1.0)
+DIRECTIONS = np.array(
+    [(x, y, z) for x in COMPONENTS for y in COMPONENTS for z in COMPONENTS if (x, y, z) != (0, 0, 0)],
+    np.float32,
+)
+
+
+def grid(size: int) -> tuple[np.ndarray, np.ndarray]:
+    """A closed box [0, size]^3 whose six sides are integer grids of two triangles a cell."""
+    corners: dict[tuple[int, int, int], int] = {}
+    faces: list[list[int]] = []
+
+    def corner(point: np.ndarray) -> int:
+        return corners.setdefault(tuple(int(x) for x in point), len(corners))
+
+    for axis in range(3):
+        u, v = np.eye(3, dtype=int)[[(axis + 1) % 3, (axis + 2) % 3]]
+        for side in (0, size):
+            base = side * np.eye(3, dtype=int)[axis]
+            for i in range(size):
+                for j in range(size):
+                    a, b, c, d = (
+                        corner(base + x * u + y * v)
+                        for x, y in ((i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1))
+                    )
+                    faces += [[a, b, c], [a, c, d]] if side else [[a, c, b], [a, d, c]]
+    return np.array(list(corners), np.float32), np.array(faces, np.int32)
+
+
 TETRAHEDRON = (
     np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]], np.float32),
     np.array([[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]], np.int32),

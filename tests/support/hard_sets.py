@@ -4,8 +4,8 @@ import functools
 from typing import NamedTuple
 
 import numpy as np
-from test_watertight import grid
 
+from support.closed_meshes import grid
 from support.meshes import soup, sphere
 
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from support.foreign_arrays import Foreign
 from support.meshes import assert_same_hits, random_rays, soup
 
 import wive
@@ -10,30 +11,6 @@ wp = pytest.importorskip("warp")
 
 MESH = soup(300, seed=1)
 RAYS = random_rays(777, seed=2, low=-0.5, high=1.5)
-
-
-class Foreign:
-    """A library that speaks DLPack and nothing else, over NumPy's memory."""
-
-    __name__ = "foreign.api"
-
-    class Array:
-        """One of its arrays; `place` is what it says of its device."""
-
-        def __init__(self, values, place=(1, 0)):
-            self.values, self.place = np.asarray(values), place
-
-        def __array_namespace__(self):
-            return Foreign()
-
-        def __dlpack__(self, **options):
-            return self.values.__dlpack__(**options)
-
-        def __dlpack_device__(self):
-            return self.place
-
-    def from_dlpack(self, source):
-        return self.Array(np.from_dlpack(source))
 
 
 class Library:

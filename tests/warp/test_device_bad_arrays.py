@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
+from support.foreign_arrays import Foreign
 from support.meshes import TRIANGLE
-from test_device_arrays import Foreign
 
 import wive
 

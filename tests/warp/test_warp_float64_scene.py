@@ -8,8 +8,8 @@ import pytest
 wp = pytest.importorskip("warp")
 
 from support.doubles import rays64, soup64, survey  # noqa: E402
+from support.foreign_arrays import Foreign  # noqa: E402
 from support.meshes import assert_same_hits  # noqa: E402
-from test_device_arrays import Foreign  # noqa: E402
 
 import wive  # noqa: E402
 
