@@ -7,15 +7,15 @@ from pathlib import Path
 # Modules of the commands that have another name.
 MODULES = {"convert": "support.convert_scene", "gpu": "gpu.run", "gpu-prepare": "gpu.prepare"}
 BENCHES = {
-    "build": "build time, SAH and memory against native Embree, from 100 thousand to 20 million triangles",
+    "build": "build time, SAH cost and memory against native Embree, 100 thousand to 20 million triangles",
     "embree": "single rays against native Embree: speed, build time, SAH, memory",
     "gpu": "wive's Warp kernels on a GPU: the core's bits, speed against Warp's own query, streams",
     "inflight": "speed and latency over the rays in flight, and what memory's latency allows",
-    "latency": "seconds of a call over batch sizes: every backend, wp.mesh_query_ray, embreex",
+    "latency": "seconds per call over batch sizes: every backend, wp.mesh_query_ray, embreex",
     "order": "steps per ray for five orders of visiting a node's children, and their speed",
     "paper": "the WiVe paper's tables: path tracing with its traversals and with Embree's",
     "pareto": "speed against leaks, wrong triangles and the error of t, with Embree and Warp",
-    "python": "what a Python user sees: embreex, trimesh, Warp and wive, NumPy in and out",
+    "python": "embreex, trimesh, Warp and wive from Python, NumPy arrays in and out",
     "quality": 'what quality="high" saves in steps per ray and costs in build time',
     "gpu-prepare": "not a bench: packs Warp and scenes for a GPU machine without a package index",
     "quote": "not a bench: writes the tables of docs/benchmarks.md from bench/results",
@@ -46,7 +46,7 @@ def main() -> int:
 
 
 def _prefer_installed_wive() -> None:
-    """Lets an installed wive, with its compiled core, win over the source folder that `-m` puts first."""
+    """Puts the source folder, which `-m` puts first, behind the installed wive, which has a compiled core."""
     root = Path(__file__).resolve().parents[1]
     if Path(sys.path[0]).resolve() == root:
         sys.path.append(sys.path.pop(0))

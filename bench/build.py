@@ -3,8 +3,8 @@
 Wall-clock seconds of wive's constructor and of rtcCommitScene, in turn, at equal numbers of threads and
 equal build quality; a ratio above 1 means that wive is faster. Two families of meshes: one piece of terrain
 sampled ever finer, and ever more copies of a model side by side. `ns_per_triangle` shows how cost grows:
-constant would be linear. SAH cost is relative to the root's area, as Embree prints it; bytes are of nodes
-and leaves.
+a constant means linear growth. SAH cost is relative to the root's area, as Embree prints it; bytes count
+nodes and leaves.
 """
 
 import argparse
@@ -32,11 +32,11 @@ USUAL = (
 )  # fmt: skip
 QUICK_SCENES = ("terrain_10k", "terrain_40k")
 QUICK_EFFORT = Effort(least=2, most=2)
-# As many rounds as large meshes leave time for: about so many triangles are built a side.
+# Large meshes get fewer rounds: about so many triangles are built per side.
 TRIANGLES_BUILT = 10_000_000
 FEWEST_ROUNDS, MOST_ROUNDS = 3, 15
-LARGEST_HIGH = 4_000_000  # triangles: what "high" quality is built of, several times as long
-MEMORY_LIMIT = 16 << 30  # bytes of address space: rather an error than a machine that swaps
+LARGEST_HIGH = 4_000_000  # triangles; "high" quality takes several times as long to build
+MEMORY_LIMIT = 16 << 30  # bytes of address space: an error is better than a machine that swaps
 
 COLUMNS = [
     "scene", "triangles", "quality", "threads", "ratio", "low", "high", "wive_seconds", "embree_seconds",
@@ -76,7 +76,7 @@ def main(options: Sequence[str]) -> None:
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20
     report.print_table(build, COLUMNS, "Building, equal threads: Embree's seconds over wive's")
     report.print_table(
-        trees, TREE_COLUMNS, "Trees, wive's over Embree's: SAH relative to the root, bytes a triangle"
+        trees, TREE_COLUMNS, "Trees, wive's over Embree's: SAH relative to the root, bytes per triangle"
     )
     print(f"\npeak memory of this process: {peak:.1f} GiB")
     content = {"isa": isa, "peak_gib": peak, "build": build, "trees": trees}
@@ -85,12 +85,12 @@ def main(options: Sequence[str]) -> None:
 
 
 def default_threads() -> tuple[int, ...]:
-    """One thread, and all there are."""
+    """One thread, and one per core."""
     return tuple(dict.fromkeys((1, core_count())))
 
 
 def draw(build: Sequence[report.Row]) -> Figure:
-    """Nanoseconds a triangle, and the ratio, over triangles: a line per family, quality and threads."""
+    """Nanoseconds per triangle, and the ratio, over triangles: a line per family, quality and threads."""
     figure, (cost, ratio) = pyplot.subplots(1, 2, figsize=(11, 4.6), layout="constrained")
     keys = list(dict.fromkeys((_family(row), row["quality"], row["threads"]) for row in build))
     for i, key in enumerate(keys):
@@ -111,7 +111,7 @@ def draw(build: Sequence[report.Row]) -> Figure:
         )
         ratio.plot(triangles, [row["ratio"] for row in rows], marker="o", markersize=3, color=f"C{i}")
     ratio.axhline(1.0, color="0.4", linewidth=1)
-    cost.set_ylabel("nanoseconds a triangle; dashed: Embree")
+    cost.set_ylabel("nanoseconds per triangle; dashed: Embree")
     ratio.set_ylabel("Embree's seconds over wive's")
     for panel in (cost, ratio):
         panel.set_xscale("log")

@@ -3,8 +3,8 @@
 Ours with one thread and as many rays in flight as asked (1: plain single-ray traversal; tuned: what a batch
 gets), against a loop over rtcIntersect1 or rtcOccluded1; float32 and compressed nodes; fast against
 Embree's default, watertight against its robust flag; each kernel against Embree held to the same
-instruction set. A ratio above 1 means that wive is faster. Hits are compared, too: `mismatches` counts rays
-that only one side hits.
+instruction set. A ratio above 1 means that wive is faster. `mismatches` counts rays that only one side
+hits.
 """
 
 import argparse
@@ -54,7 +54,7 @@ def main(options: Sequence[str]) -> None:
     scenes = folder.select(chosen.scenes, (*SCENES, LARGEST))
     kernels = usable_kernels(chosen.kernels)
     ways = product(kernels, chosen.in_flight, chosen.nodes)
-    # Other node forms are told apart by memory, not by instruction set: the first kernel speaks for all.
+    # Node forms differ in the memory they read, not by instruction set: one kernel is enough for the others.
     contenders = [Contender(*way) for way in ways if way[0] == kernels[0] or way[2] == chosen.nodes[0]]
     speed: list[report.Row] = []
     build: list[report.Row] = []
@@ -65,8 +65,7 @@ def main(options: Sequence[str]) -> None:
         if "speed" in chosen.parts:
             recorded = recorded_rays(mesh)
             sets = [recorded[kind].thinned(QUICK_RAYS if chosen.quick else RAYS) for kind in chosen.rays]
-        # Both accuracies build the same tree.
-        accuracy = chosen.accuracy[-1]
+        accuracy = chosen.accuracy[-1]  # both accuracies build the same tree
         if "tree" in chosen.parts:
             trees.append(tree_row(mesh, accuracy, contenders[0].isa))
         if "build" in chosen.parts:
@@ -121,7 +120,7 @@ def mean_rows(speed: Sequence[report.Row]) -> list[report.Row]:
 
 
 def usable_kernels(names: Sequence[str]) -> list[str]:
-    """Those of the kernels that this machine can run; says which it leaves out and why."""
+    """The kernels that this machine can run; says which it leaves out and why."""
     known = _cpu.kernels()
     usable = []
     for name in names:
@@ -131,7 +130,7 @@ def usable_kernels(names: Sequence[str]) -> list[str]:
         else:
             usable.append(name)
     if not usable:
-        raise BenchError("none of the kernels asked for can run here")
+        raise BenchError("this machine can run none of these kernels")
     return usable
 
 

@@ -1,11 +1,11 @@
 """Speed and latency over the rays in flight on one thread, from scenes in cache to ten million triangles.
 
 With K rays in flight each ray does the plain single-ray traversal, one step in turn. `speedup`: seconds
-with one ray in flight over seconds with K, measured in turn on one pinned core. `ray_ns` is a ray's share
-of the time; `latency_ns` = K times that: how long one ray is under way, by Little's law. `limit_mrays` is
-what memory alone would allow if every step (inner node or leaf) waited once for DRAM and nothing else took
-time: K / (steps a ray x latency), the latency from a pointer chase over an array that no cache holds. Above
-that line, caches helped.
+with one ray in flight over seconds with K, measured in turn on one pinned core. `ray_ns` is the time per
+ray; `latency_ns`, K times as long, is the time from a ray's first step to its last, by Little's law.
+`limit_mrays` is the speed if every step (inner node or leaf) took one DRAM latency and nothing else took
+time: K / (steps per ray x latency), with the latency from a pointer chase over an array larger than every
+cache. A speed above the limit is due to caches.
 """
 
 import argparse
@@ -81,21 +81,21 @@ def best_kernel() -> str:
 
 
 def memory_latency(size: int, loads: int) -> float:
-    """Seconds that a dependent load takes from an array of `size` bytes."""
+    """Seconds of a dependent load from an array of `size` bytes."""
     library = ctypes.CDLL(str(compiled(Path(__file__).parent / "native" / "memory_latency.cpp")))
     library.memory_latency.restype = ctypes.c_double
     library.memory_latency.argtypes = [ctypes.c_size_t, ctypes.c_size_t]
     with one_core():
         seconds = float(library.memory_latency(size, loads))
     if seconds < 0:
-        raise BenchError(f"there are no {size >> 20} MiB of memory to measure its latency on")
+        raise BenchError(f"there are no {size >> 20} MiB of memory to measure the latency on")
     return seconds
 
 
 def ray_rows(
     mesh: Mesh, tree: _cpu.Bvh, kernel: str, rays: Rays, chosen: argparse.Namespace, latency: float
 ) -> Iterator[report.Row]:
-    """One row per number of rays in flight, and one for the core's own choice."""
+    """One row per number of rays in flight, and one for the number that the core chooses."""
 
     def trace(in_flight: int) -> None:
         if rays.any_hit:
@@ -107,7 +107,7 @@ def ray_rows(
     stats = counted(kernel, *rays.arrays, stats=True)[-1]
     assert stats is not None
     steps = float(stats[:, :2].sum(axis=1).mean(dtype=np.float64))
-    flights = (1, *(k for k in chosen.in_flight if k != 1), 0)  # 0: the core's own choice
+    flights = (1, *(k for k in chosen.in_flight if k != 1), 0)  # 0: the core chooses
     runs = [timed(lambda k=k: trace(k)) for k in flights]  # type: ignore[misc]
     with one_core():
         for run in runs:
@@ -135,7 +135,7 @@ def ray_rows(
 
 
 def best_rows(rows: Sequence[report.Row]) -> list[report.Row]:
-    """Per scene and kind of rays the fastest number in flight, and what the core's own choice gives."""
+    """The fastest number in flight per scene and kind of rays, and the speedup of the core's choice."""
     best = []
     for key in dict.fromkeys((row["scene"], row["rays"]) for row in rows):
         group = [row for row in rows if (row["scene"], row["rays"]) == key]
@@ -148,7 +148,7 @@ def best_rows(rows: Sequence[report.Row]) -> list[report.Row]:
 
 
 def draw(rows: Sequence[report.Row]) -> Figure:
-    """Above Mray/s over rays in flight, dashed what DRAM's latency allows; below a ray's latency."""
+    """Above: Mray/s over rays in flight, dashed the limit by DRAM latency. Below: the latency of a ray."""
     kinds = list(dict.fromkeys(row["rays"] for row in rows))
     scenes = list(dict.fromkeys(row["scene"] for row in rows))
     figure, panels = pyplot.subplots(
@@ -171,8 +171,8 @@ def draw(rows: Sequence[report.Row]) -> Figure:
             latency.plot(flights, waits, marker="o", markersize=3, color=f"C{i}")
         speed.set_title(f"{kind} rays", fontsize=10)
         latency.set_xlabel("rays in flight on one thread")
-    panels[0][0].set_ylabel("Mray/s; dashed: every step one wait for DRAM")
-    panels[1][0].set_ylabel("nanoseconds a ray is under way")
+    panels[0][0].set_ylabel("Mray/s; dashed: one DRAM latency per step")
+    panels[1][0].set_ylabel("latency of a ray, nanoseconds")
     for panel in panels.flat:
         panel.set_xscale("log", base=2)
         panel.set_yscale("log")
@@ -189,5 +189,5 @@ def parse_options(options: Sequence[str]) -> argparse.Namespace:
     parser.add_argument("--in-flight", type=numbers, default=IN_FLIGHT, help="numbers of rays, e.g. 1,8,24")
     parser.add_argument("--rays", type=listed(KINDS), default=RAY_KINDS, help=", ".join(KINDS))
     parser.add_argument("--kernel", help="one of wive's kernels; default: the best here")
-    parser.add_argument("--accuracy", choices=ACCURACIES, default="watertight", help="of wive's kernels")
+    parser.add_argument("--accuracy", choices=ACCURACIES, default="watertight", help="accuracy of the tree")
     return parser.parse_args(options)

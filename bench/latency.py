@@ -1,10 +1,10 @@
-"""Latency of a call against throughput over batch sizes, for every backend, Warp's own query and embreex.
+"""Latency per call against throughput over batch sizes: every backend, Warp's own query and embreex.
 
-`curve`: closest hits of 1, 4, 16, ... rays a call, arrays ready where the contender wants them; a call ends
-when its answer is there. p50 and p99 are of the calls' wall-clock seconds, overhead of Python included; with
-few calls p99 is their longest. CPU backends use --threads threads, 1 unless asked, as Warp's CPU device and
-embreex do; then all are held to one core. `compare`: seconds of wp.mesh_query_ray over those of wive's Warp
-kernels on the same rays, launched in turn on arrays made before: above 1 wive is faster.
+`curve`: closest hits of 1, 4, 16, ... rays per call, from arrays on the contender's device; a call ends when
+its hits are written. p50 and p99 are quantiles of the calls' wall-clock seconds, Python's overhead included;
+with few calls p99 is the longest. CPU backends use --threads threads, by default 1 like Warp's CPU device and
+embreex; all then run on one core. `compare`: seconds of wp.mesh_query_ray over those of wive's Warp kernels
+on the same rays, launched in turn on arrays made before: above 1 wive is faster.
 """
 
 import argparse
@@ -24,18 +24,17 @@ from bench.support.scenes import SceneFolder
 from bench.support.timing import QUICK, Effort, one_core
 
 PARTS = ("curve", "compare")
-CURVE_SCENE = 0  # of the scenes asked for: the first, the smallest unless named
+CURVE_SCENE = 0  # the first of the scenes, by default the smallest
 COMPARED_KINDS = ("primary", "diffuse", "random")
 LARGEST_BATCH = 4**11
 QUICK_BATCH = 4**6
-RAYS = 65_536  # compared, of each kind and scene
+RAYS = 65_536  # compared, per kind and scene
 QUICK_RAYS = 16_384
-# Calls of one batch size: as many as fit the seconds, but within these bounds.
+# Calls per batch size: as many as the seconds allow, within these bounds.
 FEWEST_CALLS, MOST_CALLS = 3, 2000
 SECONDS, QUICK_SECONDS = 1.0, 0.02
-# A batch size that would take longer than this a call is left out, with all larger ones.
-LONGEST_CALL = 4.0
-# Batches of different rays that calls take in turn, so that no cache holds one batch's whole way.
+LONGEST_CALL = 4.0  # seconds: batches that would take longer are left out
+# Calls take this many batches of different rays in turn, so that caches don't hold all nodes of one batch.
 VARIANTS = 16
 
 CURVE_COLUMNS = ["scene", "rays", "contender", "device", "batch", "p50_us", "p99_us", "mrays", "calls"]
@@ -77,7 +76,7 @@ def main(options: Sequence[str]) -> None:
                 comparison.append(row)
                 report.print_progress(row, ("scene", "rays", "accuracy", "lanes", "ratio"))
         means = mean_rows(comparison)
-    report.print_table(curve, CURVE_COLUMNS, "Latency of a call in microseconds, and Mray/s at its median")
+    report.print_table(curve, CURVE_COLUMNS, "Latency per call in microseconds, and Mray/s at the median")
     report.print_table(comparison, COMPARE_COLUMNS, "wp.mesh_query_ray's seconds over wive's on Warp")
     report.print_table(means, MEAN_COLUMNS, "Geometric means over scenes, and the lowest")
     content = {
@@ -94,7 +93,7 @@ def main(options: Sequence[str]) -> None:
 
 
 def curve_rows(contender: Contender, rays: Rays, quick: bool) -> Iterator[report.Row]:
-    """One row per batch size, until calls get too long."""
+    """One row per batch size, up to the longest call."""
     batch, longest = 1, 0.0
     while batch <= (QUICK_BATCH if quick else LARGEST_BATCH) and 4 * longest < LONGEST_CALL:
         calls = [contender.prepare(*part) for part in _batches(rays, batch)]
@@ -114,7 +113,7 @@ def curve_rows(contender: Contender, rays: Rays, quick: bool) -> Iterator[report
 
 
 def measured(calls: Sequence[Call], budget: float) -> list[float]:
-    """Seconds of each call, made in turn; the first round only warms up."""
+    """Seconds of each call, made in turn after two to warm up."""
     for call in calls[:2]:
         call()
     seconds: list[float] = []
@@ -129,7 +128,7 @@ def measured(calls: Sequence[Call], budget: float) -> list[float]:
 
 
 def warp_device(name: str | None) -> tuple[str, report.Row]:
-    """The Warp device to measure, and what is to be known of it; "" where there is no Warp."""
+    """The Warp device to measure and its description; "" if Warp can't be used."""
     import wive
     from wive._internal.devices import resolve_device
 
@@ -184,7 +183,7 @@ def is_whole(chosen: argparse.Namespace) -> bool:
 
 
 def _batches(rays: Rays, size: int) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """Up to VARIANTS batches of different rays; one that is larger than the set repeats it."""
+    """Up to VARIANTS batches of different rays; a batch larger than the set repeats rays."""
     variants = max(1, min(VARIANTS, len(rays) // size))
     for variant in range(variants):
         chosen = np.arange(variant * size, (variant + 1) * size) % len(rays)

@@ -1,16 +1,16 @@
-"""What the order of visiting a node's children costs: steps per ray and speed, on one tree.
+"""The cost of five orders of visiting a node's children: steps per ray and speed, on one tree.
 
-Redoes the comparison of WiVe (Fuetterling et al., HPG 2017). `treelet` is the paper's order, from the split
+Repeats the comparison of WiVe (Fuetterling et al., HPG 2017). `treelet` is the paper's order, from the split
 axes of the treelet behind each node and the signs of the ray; `diagonal` sorts children along the diagonal
-of the ray's octant; `slots` is that of Ylitie, Karras and Laine (2017): each child gets one of eight places
-when the tree is built, by the assignment that suits all octants best together, and places are visited by
-their number xor the ray's octant; `none` shuffles them; `distance` sorts the children hit by their true
-entry distance, the work that the others spare. Closest hits only: for any-hit queries order matters little.
+of the ray's octant; `slots` is the order of Ylitie, Karras and Laine (2017): the builder assigns each child
+one of eight slots, by the assignment with the least total cost over all octants, and slots are visited by
+slot number xor the ray's octant; `none` shuffles the children; `distance` sorts the children hit by their
+entry distance, the work that the other orders save. Closest hits only: order matters little for any hit.
 `other_hits` counts rays whose t differs from that of the distance order (rounding at the face of a box).
 
-Speed is relative to `treelet`, in turn on one pinned core. Stored orders, `slots` among them, are followed
-by the same kernel, so their speeds differ by steps alone; one that needs no order row would also spare a
-load a node. `distance` is a kernel of its own, which sorts eight keys by a bitonic network in registers.
+Speed is relative to `treelet`, measured in turn on one pinned core. One kernel follows all stored orders,
+`slots` among them, so their speeds differ by steps alone; a kernel for `slots` without an order row would
+save one load per node. `distance` has its own kernel, which sorts eight keys by a bitonic network.
 """
 
 import argparse
@@ -146,7 +146,7 @@ def _trace(tree: _cpu.Bvh, kernel: str, rays: Rays) -> tuple[NDArray[np.float32]
 
 
 def check_same_tree(trees: Sequence[_cpu.Bvh], name: str) -> None:
-    """Raises BenchError unless the trees are alike but for their order words (the last row of each node)."""
+    """Raises BenchError if the trees differ in more than their order words (the last row of each node)."""
     first = trees[0]
     for tree in trees[1:]:
         alike = np.array_equal(first.nodes[:, :7], tree.nodes[:, :7]) and np.array_equal(

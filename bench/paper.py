@@ -1,16 +1,16 @@
-"""The WiVe paper's comparison redone: path tracing with its traversals and with Embree's, per scene.
+"""The WiVe paper's comparison repeated: path tracing with its traversals and with Embree's, per scene.
 
 Fuetterling, Lojewski, Pfreundt, Hamann, Ebert: "Accelerated Single Ray Tracing for Wide Vector Units", HPG
-2017, compares two forms with Embree's single rays: `half` on AVX-512 and `full` on AVX2. Here, too, one
-renderer traces diffuse paths of up to eight bounces off screen at 3840 x 2160, and only the traversal is
-swapped. To save time a picture is --rows whole rows spread evenly over it, --samples paths a pixel. Each
-row is rendered by wive, then by Embree held to the same instruction set, on one pinned core; `gain` is the
-median over rows of Embree's seconds over wive's, less one, in percent, shading included on both sides;
-`total_gain` that of all rows together. With one ray in flight it is the paper's algorithm; `tuned` is
-wive's default for batches, which here are of --samples x 32 rays, fewer at each bounce. `differing`: share
-of pixels that the two pictures disagree on; `mean_difference`: of the pictures, relative to their mean, 0 in
-a closed room that is black; `ray_difference`: of the numbers of rays traced, relative. All are near 0 where
-both sides find the same hits.
+2017, compares two forms with Embree's single rays: `half` on AVX-512 and `full` on AVX2. As there, one
+renderer traces diffuse paths of up to eight bounces off screen at 3840 x 2160, and only the traversal
+differs. To save time only --rows whole rows, spread evenly over the picture, are rendered, with --samples
+paths per pixel. Each row is rendered by wive, then by Embree held to the same instruction set, on one pinned
+core; `gain` is the median over rows of Embree's seconds over wive's, less one, in percent, shading included
+on both sides; `total_gain` is the gain over all rows together. One ray in flight is the paper's algorithm;
+`tuned` is wive's default for batches, which here have --samples x 32 rays, fewer at each bounce.
+`differing` is the share of pixels that differ; `mean_difference` is the mean difference of the pictures
+relative to their mean, 0 in a closed room that is black; `ray_difference` is the relative difference of the
+numbers of rays traced. All are near 0 if both sides find the same hits.
 
 The paper's own tables, on other scenes and processors, are at doi.org/10.1145/3105762.3105785.
 """
@@ -45,7 +45,7 @@ ROWS, QUICK_ROWS = 10, 4
 SAMPLES = 16
 KERNELS = ("avx512.half", "avx512.full", "avx2")  # the paper's two, and full on AVX-512
 IN_FLIGHT = (1, TUNED)
-# Pictures and rays that differ by more than this share are no longer the same work: says so.
+# If pictures or numbers of rays differ by more, the sides did not do the same work, and the bench says so.
 LARGEST_DIFFERENCE = 0.01
 
 COLUMNS = [
@@ -135,7 +135,7 @@ def race(
     with one_core():
         render(picture, places[0], None)
         render(their_picture, places[0], theirs.tracer)  # both warmed up
-        # Each call checks the mesh first, as if for a whole picture: not for one row to pay.
+        # Each call checks the mesh, once per picture in a real rendering: its time is subtracted.
         checking = float(np.median([render(picture, 0, None, rows=0)[0] for _ in range(5)]))
         pairs = [(render(picture, row, None), render(their_picture, row, theirs.tracer)) for row in places]
     our_seconds, their_seconds = ([pair[side][0] - checking for pair in pairs] for side in (0, 1))
@@ -158,7 +158,7 @@ def race(
 
 
 def percent(ratio: float) -> float:
-    """By how much more than one, in percent."""
+    """The part of a ratio above one, in percent."""
     return 100 * (ratio - 1)
 
 
@@ -228,7 +228,7 @@ def parse_options(options: Sequence[str]) -> argparse.Namespace:
     )
     parser.add_argument("--accuracy", type=listed(ACCURACIES), default=ACCURACIES, help=", ".join(ACCURACIES))
     parser.add_argument("--rows", type=int, help=f"rows of the picture that are rendered; default {ROWS}")
-    parser.add_argument("--samples", type=int, default=SAMPLES, help="paths a pixel")
+    parser.add_argument("--samples", type=int, default=SAMPLES, help="paths per pixel")
     chosen = parser.parse_args(options)
     chosen.width, chosen.height = (QUICK_WIDTH, QUICK_HEIGHT) if chosen.quick else (WIDTH, HEIGHT)
     chosen.rows = chosen.rows or (QUICK_ROWS if chosen.quick else ROWS)

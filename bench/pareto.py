@@ -2,12 +2,12 @@
 
 A closed sphere of 81,920 triangles at five scales and five places. `leaks`: the share of rays aimed from
 inside at its vertices and edges that miss. `wrong`: of rays in any direction, the share whose triangle is
-not that of accuracy "exact" on the scalar backend, which the tests hold to exact rationals. `t_median`,
-`t_worst`: the error of t in units in the last place, where the triangle is right, against t in double.
-Speed is of the latter rays on the unmoved sphere of radius 1, all contenders in turn on one core; `mrays`
-with as many rays in flight as a batch gets, `single` with one; then ours on scenes, `kept`: of the speed of
-fast. Tables give shares in millionths (ppm). `float64` is "watertight" over the same numbers as float64
-vertices and rays.
+not that of accuracy "exact" on the scalar backend, which the tests compare with exact rationals.
+`t_median`, `t_worst`: the error of t against t in double, in units in the last place, over rays with the
+right triangle. Speed is measured on the same rays and the unmoved sphere of radius 1, all contenders in turn
+on one core; `mrays` with as many rays in flight as a batch gets, `single` with one. wive's trees are measured
+on scenes as well: `kept` is the share of the speed of `fast`. Tables give shares in millionths (ppm).
+`float64` is "watertight" over the same numbers as float64 vertices and rays.
 """
 
 import argparse
@@ -29,8 +29,8 @@ from bench.support.timing import QUICK, Effort
 
 SUBDIVISIONS, QUICK_SUBDIVISIONS = 6, 4
 SCALES = (1e-6, 1e-3, 1.0, 1e3, 1e6)
-PLACES = (1.0, 10.0, 100.0, 1000.0, 3000.0)  # of the centre, in radii along (3, -2, 1)
-AIMED, QUICK_AIMED = 400_000, 20_000  # rays at vertices and edges of each case
+PLACES = (1.0, 10.0, 100.0, 1000.0, 3000.0)  # distance of the centre, in radii along (3, -2, 1)
+AIMED, QUICK_AIMED = 400_000, 20_000  # rays at vertices and edges, per case
 FREE, QUICK_FREE = 131_072, 16_384  # rays in any direction
 EFFORT = Effort(least=5, most=9)
 
@@ -39,7 +39,7 @@ CASE_COLUMNS = ["contender", "scale", "place", "leaks_ppm", "wrong_ppm", "t_medi
 
 
 class Case(NamedTuple):
-    """A sphere and what is asked of it."""
+    """A sphere and its rays."""
 
     scale: float
     place: float
@@ -82,8 +82,8 @@ def main(options: Sequence[str]) -> None:
         print(f"not here: {name}")
     on_scenes = [row for name in scenes.names for row in scene_rows(folder.load(name), chosen.quick, effort)]
     scene_means = mean_rows(on_scenes)
-    report.print_table(on_scenes, SCENE_COLUMNS, "On scenes: Mray/s, and what is kept of the speed of fast")
-    report.print_table(scene_means, MEAN_COLUMNS, "Kept of the speed of fast, over scenes and rays")
+    report.print_table(on_scenes, SCENE_COLUMNS, "On scenes: Mray/s, and the share of the speed of fast")
+    report.print_table(scene_means, MEAN_COLUMNS, "Share of the speed of fast, over scenes and rays")
     cost = float64_cost(speed)
     print(f"float64 / float32, both watertight: {cost['mrays']:.3f} in flight, {cost['single']:.3f} single")
     content = {
@@ -100,7 +100,7 @@ def main(options: Sequence[str]) -> None:
 
 
 def case(scale: float, place: float, quick: bool) -> Case:
-    """The sphere of that radius, its centre `place` radii away, and rays from inside, seeded."""
+    """The sphere of radius `scale`, its centre `place` radii away, and rays from inside, seeded."""
     import trimesh
 
     ball = trimesh.creation.icosphere(subdivisions=QUICK_SUBDIVISIONS if quick else SUBDIVISIONS)
@@ -129,7 +129,7 @@ def case(scale: float, place: float, quick: bool) -> Case:
 
 
 def distances(asked: Case, prim: NDArray[np.int32]) -> NDArray[np.float64]:
-    """(n,) t of each free ray and the plane of its triangle, in double."""
+    """(n,) t at which each free ray meets the plane of its triangle, in double."""
     origins, directions = (array.astype(np.float64) for array in asked.free)
     a, b, c = asked.vertices[asked.faces[prim]].astype(np.float64).swapaxes(0, 1)
     normal = np.cross(b - a, c - a)
@@ -162,12 +162,12 @@ def total(rows: Sequence[report.Row], name: str) -> report.Row:
 
 
 def in_ppm(rows: Sequence[report.Row]) -> list[report.Row]:
-    """Rows with their shares in millionths, which three decimals can tell from zero."""
+    """Rows with shares in millionths, as three decimals would show small shares as zero."""
     return [{**row, **{f"{key}_ppm": 1e6 * row[key] for key in ("leaks", "wrong")}} for row in rows]
 
 
 def float64_cost(speed: dict[str, report.Row]) -> dict[str, float]:
-    """Speed of float64 by that of float32, in flight and one by one."""
+    """Speed of float64 over that of float32, in flight and with single rays."""
     double, single = speed["float64"], speed["watertight"]
     return {way: double[f"{way}_ratio"] / single[f"{way}_ratio"] for way in ("mrays", "single")}
 

@@ -1,12 +1,11 @@
-"""What a Python user sees: the same NumPy rays through embreex, trimesh, Warp, Open3D and wive, arrays out.
+"""The same NumPy rays through embreex, trimesh, Warp, Open3D and wive from Python, arrays out.
 
 `ratio`: the other's seconds over wive's for the same query on the same rays, in turn; above 1 wive is
 faster. trimesh's intersector is measured against `wive.Scene` and against its drop-in replacement in
-`wive.trimesh`. With one thread both are held to one core and CPU time counts; with all threads wall-clock
-time does (embreex, trimesh and Warp's CPU device use one thread whatever there is). Each as it comes: wive
-watertight, the others as their defaults are. `hits`: how many each found; all-hit counts differ where
-trimesh steps over near hits or finds one twice. The last table has microseconds of a whole call for a
-single ray, median and 99th percentile.
+`wive.trimesh`. With one thread both run on one core and CPU time counts; with all threads wall-clock time
+counts (embreex, trimesh and Warp's CPU device always use one thread). Every library runs with its defaults,
+wive watertight. `hits` is the number of hits found; all-hit counts differ if trimesh skips near hits or
+finds one twice. The last table has microseconds of a whole call for a single ray, median and 99th percentile.
 """
 
 import argparse
@@ -40,10 +39,10 @@ SCENES = ("living_room", "bmw_m6", "bathroom_salledebain", "furball_embree_tubes
 OPTIONAL = {"open3d"}  # a run without it is whole
 RAY_KINDS = ("primary", "diffuse", "random")
 RAYS, QUICK_RAYS = 131_072, 4_096
-# All hits: trimesh casts every ray again from each of its hits.
+# All hits take fewer rays, because trimesh casts every ray again from each of its hits.
 ALL_HITS_RAYS, QUICK_ALL_HITS_RAYS = 16_384, 256
 EFFORT = Effort(least=5, most=9)
-SINGLE_RAYS = 64  # different ones, called in turn
+SINGLE_RAYS = 64  # different rays, called in turn
 SINGLE_SECONDS = 0.5
 
 COLUMNS = [
@@ -75,7 +74,7 @@ def main(options: Sequence[str]) -> None:
     means = mean_rows(rows)
     report.print_table(rows, COLUMNS, "NumPy in and out: the other's seconds over wive's")
     report.print_table(means, MEAN_COLUMNS, "Geometric mean and lowest over scenes and rays")
-    report.print_table(single, SINGLE_COLUMNS, "One ray: microseconds a call")
+    report.print_table(single, SINGLE_COLUMNS, "One ray: microseconds per call")
     print("".join(f"\n{line}" for line in missing))
     content = {"missing": missing, "rows": rows, "means": means, "single": single}
     whole = scenes.whole and not chosen.quick and chosen.rays == RAY_KINDS and set(absent()) <= OPTIONAL
@@ -85,7 +84,7 @@ def main(options: Sequence[str]) -> None:
 def speed_rows(
     mesh: Mesh, ours: Ours, rivals: Sequence[Caller], recorded: Rays, quick: bool
 ) -> Iterator[report.Row]:
-    """One row per rival, number of threads and counterpart of ours."""
+    """One row per rival, number of threads and wive call for the same query."""
     for rival in rivals:
         if rival.query == ALL:
             rays = recorded.thinned(QUICK_ALL_HITS_RAYS if quick else ALL_HITS_RAYS)
@@ -110,7 +109,7 @@ def race(ours: Caller, rival: Caller, rays: Rays, threads: int, quick: bool) -> 
     """Times both in turn on the same arrays."""
     timer = timed if threads == 1 else wall_timed
     arrays = rays.origins, rays.directions
-    found = ours.hits(ours.call(*arrays)), int(rival.hits(rival.call(*arrays)))  # warms up, too
+    found = ours.hits(ours.call(*arrays)), int(rival.hits(rival.call(*arrays)))  # warms up
     runs = timer(lambda: ours.call(*arrays)), timer(lambda: rival.call(*arrays))
     if threads == 1:
         with one_core():
@@ -132,7 +131,7 @@ def race(ours: Caller, rival: Caller, rays: Rays, threads: int, quick: bool) -> 
 def single_rows(
     mesh: Mesh, ours: Ours, rivals: Sequence[Caller], recorded: Rays, quick: bool
 ) -> Iterator[report.Row]:
-    """One row per caller, ours for every query there is."""
+    """One row per caller, wive's for every query."""
     callers = [*(ours.by_scene(query, 1) for query in QUERIES), *rivals]
     callers += [caller for rival in rivals for caller in ours.counterparts(rival, 1) if caller.name != SCENE]
     parts = [(recorded.origins[i : i + 1], recorded.directions[i : i + 1]) for i in range(SINGLE_RAYS)]

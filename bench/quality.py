@@ -1,8 +1,8 @@
-"""What quality="high" saves and costs, over quality="medium": steps per ray, SAH cost, bytes, build time.
+"""Trees of quality="high" over those of quality="medium": steps per ray, SAH cost, bytes, build time.
 
 A step is an inner node visited or a block of four triangles tested; counts are exact and the same on every
-machine. The mean is over primary, diffuse and random rays, as many of each. Build time is CPU time on one
-thread, A, B, A, B.
+machine. The mean is over equally many primary, diffuse and random rays. Build time is CPU time on one thread,
+both qualities in turn.
 """
 
 import argparse
@@ -16,7 +16,7 @@ from bench.support.timing import QUICK, Effort, compare, geometric_mean, timed
 from wive import _cpu
 
 KINDS = ("primary", "diffuse", "random")
-KERNEL = "scalar"  # which every machine has
+KERNEL = "scalar"  # the kernel that every machine has
 RAYS, QUICK_RAYS = 65_536, 4096
 STEPS = [f"{kind}_steps" for kind in (*KINDS, "mean")]
 COLUMNS = ["scene", "triangles", *STEPS, "sah", "bytes", "depth", "build_time"]
@@ -44,7 +44,7 @@ def main(options: Sequence[str]) -> None:
 
 
 def scene_row(mesh: Mesh, sets: Sequence[Rays], effort: Effort) -> report.Row:
-    """Both trees on one mesh."""
+    """Both trees of one mesh."""
 
     def high() -> _cpu.Bvh:
         return _cpu.Bvh(mesh.vertices, mesh.faces, threads=1, quality="high")

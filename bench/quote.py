@@ -1,7 +1,7 @@
 """Writes the tables of docs/benchmarks.md from the files in bench/results.
 
-A table stands between `<!-- quote: NAME -->` and `<!-- end -->`; what is there is replaced. Tables whose
-results are missing stay as they are.
+A table goes between `<!-- quote: NAME -->` and `<!-- end -->`, and replaces the text there. A table whose
+results are missing stays as it is.
 """
 
 import argparse
@@ -21,7 +21,7 @@ Table = Callable[[report.Row], str]
 
 
 def main(options: Sequence[str]) -> None:
-    """Rewrites the document, and says what it lacks."""
+    """Rewrites the document, and prints which tables have no results."""
     parser = argparse.ArgumentParser(prog="python -m bench quote", description=__doc__)
     parser.add_argument("--document", type=Path, default=DOCUMENT)
     parser.add_argument("--results", type=Path, default=report.RESULTS, help="the folder of JSON files")
@@ -35,7 +35,7 @@ def main(options: Sequence[str]) -> None:
 
 
 def quoted(text: str, results: Path) -> str:
-    """The text with its tables as the results have them."""
+    """The text with its tables made from the results."""
 
     def fresh(match: re.Match[str]) -> str:
         path = results / f"{match[2].split('.')[0]}.json"
@@ -65,7 +65,7 @@ def where(rows: Sequence[report.Row], **wanted: object) -> list[report.Row]:
 def pivot(
     rows: Sequence[report.Row], value: str, heads: Sequence[tuple[str, report.Row]], form: str = "{:.2f}"
 ) -> str:
-    """A line a scene, a column for each of the (title, wanted values), and below them means and lowest."""
+    """A line per scene, a column per (title, wanted values), and below them the means and the lowest."""
     columns = [where(rows, **wanted) for _, wanted in heads]
     lines: list[list[object]] = []
     for scene, triangles in distinct(rows, "scene", "triangles"):
@@ -110,7 +110,7 @@ def embree_compressed(content: report.Row) -> str:
 
 
 def embree_build(content: report.Row) -> str:
-    """Build time, SAH and bytes a triangle."""
+    """Build time, SAH cost and bytes per triangle."""
     lines = []
     for tree in content["trees"]:
         times = {row["threads"]: row for row in where(content["build"], scene=tree["scene"])}
@@ -128,12 +128,12 @@ def embree_build(content: report.Row) -> str:
     threads = sorted({row["threads"] for row in content["build"]})
     heads = [f"build, {number} thread{'s' * (number > 1)}" for number in threads]
     seconds = f"seconds, {threads[-1]} threads"
-    sides = ["SAH cost, wive / Embree", "bytes a triangle, wive / Embree"]
+    sides = ["SAH cost, wive / Embree", "bytes per triangle, wive / Embree"]
     return markdown(["scene", "triangles", *heads, seconds, *sides], lines)
 
 
 def build_growth(content: report.Row) -> str:
-    """How the cost of building grows with the mesh."""
+    """Cost of building by size of the mesh."""
     lines = []
     trees = {(row["scene"], row["quality"]): row for row in content["trees"]}
     for scene, quality in distinct(content["build"], "scene", "quality"):
@@ -151,7 +151,7 @@ def build_growth(content: report.Row) -> str:
                 f"{tree['wive_bytes']:.1f} / {tree['embree_bytes']:.1f}",
             ]
         )
-    heads = ["ns a triangle, wive", "Embree", "ratio", "SAH ratio", "bytes a triangle"]
+    heads = ["ns per triangle, wive", "Embree", "ratio", "SAH ratio", "bytes per triangle"]
     return markdown(["mesh", "quality", "triangles", *heads], lines, 2)
 
 
@@ -172,7 +172,7 @@ def paper_gains(content: report.Row) -> str:
 
 
 def python_means(content: report.Row) -> str:
-    """How much faster a Python user is, per rival and number of threads."""
+    """Speed of wive from Python over each rival, per number of threads."""
     lines = [
         [
             *(row[key] for key in ("query", "other", "ours", "threads")),
@@ -185,12 +185,12 @@ def python_means(content: report.Row) -> str:
 
 
 def python_single(content: report.Row) -> str:
-    """Microseconds of a call for one ray, the median over scenes."""
+    """Microseconds per call for one ray, the median over scenes."""
     lines = []
     for query, caller in distinct(content["single"], "query", "caller"):
         times = sorted(row["p50_us"] for row in where(content["single"], query=query, caller=caller))
         lines.append([query, caller, f"{times[len(times) // 2]:.1f}"])
-    return markdown(["query", "caller", "microseconds a call"], lines, 2)
+    return markdown(["query", "caller", "microseconds per call"], lines, 2)
 
 
 def inflight_best(content: report.Row) -> str:
@@ -220,7 +220,7 @@ def order_means(content: report.Row) -> str:
 
 
 def order_scenes(content: report.Row) -> str:
-    """Inner nodes, leaves and triangles a ray, per scene and order."""
+    """Inner nodes, leaves and triangles per ray, per scene and order."""
     orders = [order for (order,) in distinct(content["rows"], "order")]
     lines: list[list[object]] = []
     for scene, kind in distinct(content["rows"], "scene", "rays"):
@@ -244,7 +244,7 @@ def pareto_means(content: report.Row) -> str:
 
 
 def pareto_scenes(content: report.Row) -> str:
-    """What each keeps of the speed of `fast` on scenes."""
+    """Each contender's share of the speed of `fast` on scenes."""
     keys = ("mean_mrays", "lowest_mrays", "mean_single", "lowest_single")
     lines = [[row["contender"], *(f"{row[key]:.2f}" for key in keys)] for row in content["scene_means"]]
     heads = ["in flight, geometric mean", "lowest", "one ray, geometric mean", "lowest"]

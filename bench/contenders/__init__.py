@@ -1,1 +1,1 @@
-"""What benches race: native Embree, embreex, trimesh, wp.mesh_query_ray, and wive itself."""
+"""What benches compare: native Embree, embreex, trimesh, wp.mesh_query_ray and wive."""

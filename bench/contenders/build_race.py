@@ -12,7 +12,7 @@ from bench.support.scenes import Mesh
 from bench.support.timing import Comparison, Effort, compare, core_count
 from wive import _cpu
 
-WARMED_UP = 4_000_000  # triangles from which a build takes so long that the first is like any other
+WARMED_UP = 4_000_000  # triangles; a longer build needs no other to warm up
 
 
 def build_rows(
@@ -23,7 +23,7 @@ def build_rows(
     effort: Effort,
     quality: Quality = "medium",
 ) -> Iterator[Row]:
-    """Building alone, per thread count: our constructor against rtcCommitScene at the same quality."""
+    """Build times, one row per thread count: wive's constructor against rtcCommitScene, at one quality."""
     for threads in thread_counts:
         comparison = _compare_builds(mesh, accuracy, isa, threads, effort, quality)
         yield {
@@ -46,7 +46,7 @@ def _compare_builds(
         start = time.perf_counter()
         tree = _cpu.Bvh(mesh.vertices, mesh.faces, accuracy, quality=quality, threads=threads)
         seconds = time.perf_counter() - start
-        del tree  # freeing is not building
+        del tree  # after the clock has stopped
         return seconds
 
     def their_seconds() -> float:
@@ -61,9 +61,9 @@ def _compare_builds(
 
 
 def tree_row(mesh: Mesh, accuracy: Accuracy, isa: Isa, quality: Quality = "medium") -> Row:
-    """SAH cost and bytes of both trees, ours over Embree's.
+    """SAH cost and bytes of both trees, wive's over Embree's.
 
-    The ratio of bytes is against what Embree uses; `embree_allocated` is what it holds for that.
+    The ratio of bytes is over those that Embree's tree uses; `embree_allocated` are those that it allocates.
     """
     ours = _cpu.Bvh(mesh.vertices, mesh.faces, accuracy, quality=quality)
     inner, leaves = ours.sah

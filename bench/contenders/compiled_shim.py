@@ -14,11 +14,11 @@ FLAGS = ["-O2", "-std=c++17", "-shared", "-fPIC"]
 
 
 class BenchError(RuntimeError):
-    """Something the machine lacks; the text says what, in one line."""
+    """Something that the machine lacks; the text names it in one line."""
 
 
 def cache_folder() -> Path:
-    """Where compiled shims and recorded rays are kept between runs: $XDG_CACHE_HOME/wive-bench."""
+    """The folder of compiled shims and recorded rays: $XDG_CACHE_HOME/wive-bench."""
     base = os.environ.get("XDG_CACHE_HOME")
     folder = (Path(base) if base else Path.home() / ".cache") / "wive-bench"
     folder.mkdir(parents=True, exist_ok=True)
@@ -26,7 +26,7 @@ def cache_folder() -> Path:
 
 
 def embree_library() -> Path:
-    """Path of the Embree 4 shared library that the installed embreex wheel carries."""
+    """Path of the Embree 4 shared library in the installed embreex wheel."""
     try:
         files = importlib.metadata.files("embreex") or []
     except importlib.metadata.PackageNotFoundError:
@@ -53,7 +53,7 @@ def compiler() -> list[str]:
 
 
 def compiler_version() -> str:
-    """First line of what the compiler says about itself."""
+    """The first line of the compiler's --version."""
     answer = subprocess.run([*compiler(), "--version"], capture_output=True, text=True, check=False)
     return (answer.stdout.splitlines() or ["unknown"])[0]
 

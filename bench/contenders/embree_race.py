@@ -20,7 +20,7 @@ TUNED = 0  # in flight: as many rays as the core chooses
 
 @dataclass(frozen=True)
 class Contender:
-    """One way of ours to trace, and the Embree that it is measured against."""
+    """One way to trace with wive, and the instruction set that Embree is held to against it."""
 
     kernel: str
     in_flight: int = 1
@@ -36,7 +36,7 @@ class Contender:
 def embree_tree(
     mesh: Mesh, accuracy: Accuracy, isa: Isa, threads: int = 1, quality: Quality = "medium"
 ) -> EmbreeMesh:
-    """Embree's counterpart to an accuracy of ours, not yet built: robust for watertight."""
+    """Embree's counterpart to one of wive's accuracies, not yet built: robust for watertight."""
     robust = accuracy == "watertight"
     return EmbreeMesh(mesh.vertices, mesh.faces, isa=isa, robust=robust, threads=threads, quality=quality)
 
@@ -79,14 +79,14 @@ def speed_rows(
 def race(
     ours: _cpu.Bvh, theirs: EmbreeMesh, contender: Contender, rays: Rays, effort: Effort
 ) -> tuple[Comparison, int]:
-    """Times both on one set of rays; also the number of rays that only one of them hits."""
+    """The times of both sides on one set of rays, and the number of rays that only one side hits."""
     runs = (
         _any_hit(ours, theirs, contender, rays)
         if rays.any_hit
         else _closest_hit(ours, theirs, contender, rays)
     )
     our_run, their_run = runs
-    mismatches = int(np.count_nonzero(our_run() != their_run()))  # this is the warm-up, too
+    mismatches = int(np.count_nonzero(our_run() != their_run()))  # warms up
     return compare(timed(our_run), timed(their_run), effort), mismatches
 
 

@@ -1,7 +1,7 @@
-"""What Embree says about the tree it builds: SAH cost, bytes, nodes, and the traversal kernel it chose.
+"""Embree's own statistics of a tree: SAH cost, bytes, nodes, and the traversal kernel it chose.
 
-Embree prints these to standard output (`verbose=2`) and has no call that returns them, so the build runs in a
-process of its own whose output is read.
+Embree prints them to standard output (`verbose=2`) and has no call that returns them, so the tree is built in
+another process, whose output is parsed.
 """
 
 import re
@@ -21,7 +21,7 @@ from bench.support.timing import core_count
 
 @dataclass(frozen=True)
 class TreeStatistics:
-    """One tree of Embree's. SAH costs count inner nodes and triangle blocks, relative to the root."""
+    """Statistics of one tree. SAH costs count inner nodes and triangle blocks, relative to the root."""
 
     sah_inner: float
     sah_leaves: float
@@ -42,7 +42,7 @@ PATTERNS = {
 
 
 def embree_statistics(mesh: Mesh, *, isa: Isa, robust: bool, quality: Quality = "medium") -> TreeStatistics:
-    """Builds the mesh once in another process and reads what Embree prints."""
+    """Statistics of the mesh's tree, built in another process."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "mesh.npz"
         np.savez(path, vertices=mesh.vertices, faces=mesh.faces)
@@ -54,7 +54,7 @@ def embree_statistics(mesh: Mesh, *, isa: Isa, robust: bool, quality: Quality = 
 
 
 def parse(printed: str, name: str, complaint: str = "") -> TreeStatistics:
-    """The numbers in what Embree printed; BenchError where one is missing."""
+    """The statistics in Embree's output; BenchError if one is missing."""
     found: dict[str, str] = {}
     for key, pattern in PATTERNS.items():
         match = re.search(pattern, printed)
@@ -72,7 +72,7 @@ def parse(printed: str, name: str, complaint: str = "") -> TreeStatistics:
     )
 
 
-def _build_talking(path: str, isa: Isa, robust: bool, quality: Quality) -> None:
+def _build_verbosely(path: str, isa: Isa, robust: bool, quality: Quality) -> None:
     with np.load(path) as arrays:
         vertices, faces = arrays["vertices"], arrays["faces"]
     threads = core_count()
@@ -83,4 +83,4 @@ def _build_talking(path: str, isa: Isa, robust: bool, quality: Quality) -> None:
 
 
 if __name__ == "__main__":
-    _build_talking(sys.argv[1], sys.argv[2], sys.argv[3] == "1", sys.argv[4])  # type: ignore[arg-type]
+    _build_verbosely(sys.argv[1], sys.argv[2], sys.argv[3] == "1", sys.argv[4])  # type: ignore[arg-type]

@@ -1,4 +1,4 @@
-"""Who answers the calls of `bench latency`: every backend and lane form, Warp's own query, embreex."""
+"""The contenders of `bench latency`: every backend and lane form, Warp's own query, embreex."""
 
 import importlib.util
 from collections.abc import Callable, Iterator, Sequence
@@ -19,9 +19,9 @@ LaneForm = Literal[1, 8]
 
 @dataclass(frozen=True)
 class Contender:
-    """A way to find closest hits: from a batch of rays to a call that answers it, and waits for the answer.
+    """A way to find closest hits: `prepare` turns a batch of rays into a call that returns with hits written.
 
-    Rays are brought to where the contender wants them beforehand, not during the call.
+    `prepare` brings the rays to the contender's device; the call does not.
     """
 
     name: str
@@ -32,7 +32,7 @@ class Contender:
 def contenders(
     mesh: Mesh, device: str, lanes: Sequence[LaneForm], threads: int, only: Sequence[str]
 ) -> Iterator[Contender]:
-    """Those that can run here, each built over the mesh when its turn comes."""
+    """The contenders that can run here, each built over the mesh just before it is measured."""
     makers: dict[str, Callable[[], Contender]] = {}
     for name, backend in wive.backends().items():
         if name in CPU_BACKENDS and backend.usable:

@@ -1,4 +1,4 @@
-"""Embree 4 called natively on NumPy arrays, one ray at a time: the other side of the comparison."""
+"""Embree 4 called natively on NumPy arrays, one ray at a time."""
 
 import ctypes
 from collections.abc import Iterator
@@ -65,7 +65,7 @@ def _shim() -> ctypes.CDLL:
 
 @contextmanager
 def flushed_denormals(enabled: bool) -> Iterator[None]:
-    """Has the calling thread flush denormals to zero, or keep them, for the duration."""
+    """Makes the calling thread flush denormals to zero, or keep them, inside the block."""
     before = _shim().shim_flush_denormals(int(enabled))
     try:
         yield
@@ -74,12 +74,12 @@ def flushed_denormals(enabled: bool) -> Iterator[None]:
 
 
 def trim_heap() -> None:
-    """Gives freed memory back to the system: a build that follows finds no pages warmed by an earlier one."""
+    """Gives freed memory back to the system, so that a build reuses no pages of an earlier build."""
     _shim().shim_trim_heap()
 
 
 class EmbreeMesh:
-    """One mesh in an Embree device of its own; the tree stands after `commit`.
+    """One mesh in an Embree device of its own; `commit` builds the tree.
 
     vertices (v,3) float32 and faces (f,3) int32 are C-contiguous. `robust` sets Embree's robust flag; `isa`,
     `threads` and `verbose` go into the device's configuration. An instruction set that this machine lacks
@@ -134,7 +134,7 @@ class EmbreeMesh:
 
     @property
     def memory(self) -> int:
-        """Bytes that Embree has allocated for this mesh now; vertices and faces are not its own."""
+        """Bytes that Embree has allocated for this mesh; it shares vertices and faces."""
         return int(_shim().shim_bytes(self._mesh))
 
     def commit(self) -> float:
@@ -161,7 +161,7 @@ class EmbreeMesh:
 
     @property
     def tracer(self) -> tuple[int, int]:
-        """The same closest hits for `_cpu.Bvh.render_rows`: addresses of a function and of its context."""
+        """Closest hits for `_cpu.Bvh.render_rows`: the addresses of a function and of its context."""
         address = ctypes.cast(_shim().shim_trace, Pointer).value
         assert address and self._mesh
         return address, self._mesh
@@ -173,7 +173,7 @@ class EmbreeMesh:
         tmin: NDArray[np.float32],
         tmax: NDArray[np.float32],
     ) -> NDArray[np.bool_]:
-        """Whether anything is in the way, by rtcOccluded1: (n,) bool."""
+        """Whether each ray hits anything, by rtcOccluded1: (n,) bool."""
         rays = _rays(origins, directions, tmin, tmax)
         result = np.empty(rays.count, np.bool_)
         _shim().shim_occluded(self._mesh, rays, result.ctypes.data)

@@ -1,4 +1,4 @@
-"""Who is measured by `bench pareto`: closest hits of a batch on one core, in several accuracies."""
+"""The contenders of `bench pareto`: closest hits of a batch on one core, in several accuracies."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ Trace = Callable[[Array, Array], Hits]
 
 
 class Options(NamedTuple):
-    """Of one of our trees."""
+    """Options of one of wive's trees."""
 
     accuracy: Literal["fast", "watertight", "exact"]
     nodes: Literal["float32", "compressed"] = "float32"
@@ -39,7 +39,7 @@ ZERO, INFINITE = np.zeros(1, np.float32), np.full(1, np.inf, np.float32)
 
 @dataclass(frozen=True)
 class Contender:
-    """A way to find closest hits; `trace_single` keeps no other ray in flight, where that is a choice."""
+    """A way to find closest hits; `trace_single` traces ray by ray, and is None without that choice."""
 
     name: str
     trace: Trace
@@ -48,7 +48,7 @@ class Contender:
 
 
 def contenders(vertices: Array, faces: NDArray[np.int32]) -> tuple[list[Contender], list[str]]:
-    """Those that run here, each built over the mesh, and a line for each that does not, saying why."""
+    """The contenders that run here, built over the mesh, and a line per other contender that says why not."""
     kernel = _best_kernel()
     found = wive_contenders(vertices, faces)
     missing = []
@@ -66,14 +66,14 @@ def contenders(vertices: Array, faces: NDArray[np.int32]) -> tuple[list[Contende
 
 
 def wive_contenders(vertices: Array, faces: NDArray[np.int32]) -> list[Contender]:
-    """Ours, `fast` first."""
+    """wive's contenders, `fast` first."""
     return [_wive(name, _best_kernel(), vertices, faces) for name in WIVE]
 
 
 def exact_prims(
     vertices: Array, faces: NDArray[np.int32], origins: Array, directions: Array
 ) -> NDArray[np.int32]:
-    """(n,) the right triangles: accuracy "exact" of the scalar kernel, which tests compare with rationals."""
+    """(n,) right triangles, by accuracy "exact" of the scalar kernel, which tests compare with rationals."""
     bvh = _cpu.Bvh(vertices, faces, "exact")
     prim = bvh.intersect("scalar", origins, directions, ZERO, INFINITE)[1]
     if (prim < 0).any():
@@ -90,7 +90,7 @@ def _wive(name: str, kernel: str, vertices: Array, faces: NDArray[np.int32]) -> 
     real = real_named(options.precision)
     bvh = _cpu.Bvh(real.array(vertices), faces, options.accuracy, nodes=options.nodes)
     zero, infinite = real.limits.values()
-    held: dict[int, Floats] = {}  # rays in this precision: who has such numbers has such rays
+    held: dict[int, Floats] = {}  # rays converted to this precision, as a user's would be
 
     def ready(rays: Array) -> Floats:
         if id(rays) not in held:

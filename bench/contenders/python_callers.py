@@ -1,4 +1,4 @@
-"""Who answers the queries of `bench python`, NumPy in and out: wive, embreex, trimesh, Warp, Open3D."""
+"""The calls that `bench python` compares, NumPy arrays in and out: wive, embreex, trimesh, Warp, Open3D."""
 
 import importlib.util
 from collections.abc import Callable, Iterator
@@ -14,7 +14,7 @@ from bench.support.scenes import Mesh
 
 Array = NDArray[np.float32]
 
-# What is asked, in the words of the table, and which rays it is asked for at a time.
+# The queries, as the table names them.
 CLOSEST = "closest: t, prim, uv"
 FIRST = "closest: prim alone"
 ANY = "any hit"
@@ -26,27 +26,27 @@ QUERIES = (CLOSEST, FIRST, ANY, LOCATION, ALL)
 
 @dataclass(frozen=True)
 class Caller:
-    """One library's way to answer one query: a call on origins and directions, and the hits in its answer."""
+    """One library's call for one query: `call` takes origins and directions, `hits` counts the hits."""
 
     name: str
     query: str
     call: Callable[[Array, Array], Any]
     hits: Callable[[Any], int]
-    method: str = ""  # of trimesh's intersector, for ours of that name
+    method: str = ""  # trimesh's intersector method, which wive.trimesh has under the same name
     options: dict[str, bool] = field(default_factory=dict)
 
 
 class Ours:
-    """wive's answer to every query, on a number of threads: by a scene and by the intersector for trimesh."""
+    """wive's calls for every query and number of threads: of a scene and of the intersector for trimesh."""
 
     def __init__(self, mesh: Mesh) -> None:
-        """Answers for this mesh."""
+        """Builds the scene of the mesh."""
         self.mesh = mesh
         self.scene = wive.Scene(mesh.vertices, mesh.faces)
         self._drop_ins: dict[int, Any] = {}
 
     def counterparts(self, rival: Caller, threads: int) -> Iterator[Caller]:
-        """What a user would call in place of a rival."""
+        """The calls that can replace a rival's."""
         yield self.by_scene(rival.query, threads)
         if rival.method:
             bound = getattr(self._drop_in(threads), rival.method)
@@ -60,7 +60,7 @@ class Ours:
         return self._drop_ins[threads]
 
     def by_scene(self, query: str, threads: int) -> Caller:
-        """One query on so many threads, by `wive.Scene`."""
+        """The call of `wive.Scene` for a query."""
         scene: Any = self.scene
 
         def intersect(origins: Array, directions: Array) -> Any:
@@ -93,7 +93,7 @@ class Ours:
 
 
 def others(mesh: Mesh) -> Iterator[Caller]:
-    """Every caller that is installed here but ours."""
+    """The callers of every other library that is installed."""
     makers = {"embreex": _embreex, "trimesh": _trimesh, "warp": _warp, "open3d": _open3d}
     for module, make in makers.items():
         if importlib.util.find_spec(module) is not None:
@@ -101,7 +101,7 @@ def others(mesh: Mesh) -> Iterator[Caller]:
 
 
 def absent() -> list[str]:
-    """The libraries that are not installed here."""
+    """The libraries that are not installed."""
     return [
         name for name in ("embreex", "trimesh", "warp", "open3d") if importlib.util.find_spec(name) is None
     ]

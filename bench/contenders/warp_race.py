@@ -1,4 +1,4 @@
-"""wive's Warp kernels against `wp.mesh_query_ray`: same mesh, same rays, launched in turn on one device."""
+"""wive's Warp kernels against `wp.mesh_query_ray` on the same rays, launched in turn on one device."""
 
 import time
 from collections.abc import Callable, Iterator, Sequence

@@ -1,1 +1,1 @@
-"""The figures that benches draw of their results."""
+"""Figures of the results."""

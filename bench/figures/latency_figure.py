@@ -1,4 +1,4 @@
-"""The figure of `bench latency`: what a call costs as batches grow, and the throughput that buys."""
+"""The figure of `bench latency`: time per call over batch size, and throughput over time per call."""
 
 from collections.abc import Sequence
 
@@ -12,7 +12,7 @@ from bench.support.report import Row
 
 
 def draw(curve: Sequence[Row]) -> Figure:
-    """Left: seconds of a call over rays a call, the median and its 99th percentile. Right: what it yields."""
+    """Left: microseconds per call over rays per call, p50 and p99. Right: Mray/s over those microseconds."""
     figure, (left, right) = pyplot.subplots(1, 2, figsize=(11, 4.6), layout="constrained")
     for i, name in enumerate(dict.fromkeys(row["contender"] for row in curve)):
         rows = [row for row in curve if row["contender"] == name]
@@ -24,9 +24,9 @@ def draw(curve: Sequence[Row]) -> Figure:
         left.plot(batch, p50, marker="o", markersize=3, color=f"C{i}", label=label)
         left.plot(batch, p99, linestyle=":", linewidth=1, color=f"C{i}")
         right.plot(p50, mrays, marker="o", markersize=3, color=f"C{i}")
-    left.set_xlabel("rays a call")
-    left.set_ylabel("microseconds a call: p50, dotted p99")
-    right.set_xlabel("microseconds a call, p50")
+    left.set_xlabel("rays per call")
+    left.set_ylabel("microseconds per call: p50, dotted p99")
+    right.set_xlabel("microseconds per call, p50")
     right.set_ylabel("Mray/s")
     for panel in (left, right):
         panel.set_xscale("log")

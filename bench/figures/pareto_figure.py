@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from bench.support.report import Row
 
-FLOOR = 1e-7  # where a rate of zero is drawn
+FLOOR = 1e-7  # the height at which a rate of zero is drawn
 
 
 def draw(means: Sequence[Row], rows: Sequence[Row]) -> Figure:

@@ -1,8 +1,8 @@
 // Embree's single-ray calls in a loop over arrays, as C functions for ctypes.
 //
 // The embreex wheel carries Embree's shared library but no headers, so the few types and constants of Embree 4's
-// C interface that are needed stand here (names and values: include/embree4 of Embree 4.4, Apache-2.0).
-// The loops do for Embree what a C++ user would: one ray structure on the stack, arguments and context made once.
+// C interface that are needed are defined here (names and values: include/embree4 of Embree 4.4, Apache-2.0).
+// The loops call Embree as a C++ user would: one ray structure on the stack, arguments and context made once.
 
 #include <dlfcn.h>
 #include <xmmintrin.h>
@@ -50,7 +50,7 @@ struct QueryContext {
     unsigned instance, instance_prim;
 };
 
-struct QueryArguments {  // RTCIntersectArguments and RTCOccludedArguments are laid out alike
+struct QueryArguments {  // RTCIntersectArguments and RTCOccludedArguments have the same layout
     int flags = 0;       // RTC_RAY_QUERY_FLAG_INCOHERENT
     unsigned features = ~0u;
     QueryContext* context = nullptr;
@@ -63,7 +63,7 @@ constexpr int geometry_type_triangle = 0;
 constexpr int buffer_type_index = 0, buffer_type_vertex = 1;
 constexpr int format_uint3 = 0x5003, format_float3 = 0x9003;
 
-// Every entry point by its name in the library; resolve() fills them in.
+// The entry points by their names in the library; resolve() sets them.
 #define EMBREE_FUNCTIONS(X)                                                                            \
     X(rtcNewDevice, Handle, (const char*))                                                             \
     X(rtcReleaseDevice, void, (Handle))                                                                \
@@ -133,7 +133,7 @@ Ray constant_fields() {
 
 extern "C" {
 
-// Opens Embree's shared library; returns what is wrong, or nullptr.
+// Opens Embree's shared library; returns an error message, or nullptr.
 const char* shim_open(const char* path) {
     static std::string problem;
     void* library = dlopen(path, RTLD_NOW | RTLD_LOCAL);
@@ -146,7 +146,7 @@ const char* shim_open(const char* path) {
     return nullptr;
 }
 
-// A device with one triangle mesh, not yet built; nullptr where Embree refuses the configuration.
+// A device with one triangle mesh, not yet built; nullptr if Embree refuses the configuration.
 Mesh* shim_create(const char* config, const float* vertices, std::size_t vertex_count, const std::uint32_t* faces,
                   std::size_t face_count, int robust, int quality) {
     auto mesh = std::make_unique<Mesh>();
@@ -172,7 +172,7 @@ Mesh* shim_create(const char* config, const float* vertices, std::size_t vertex_
     return rtcGetDeviceError(mesh->device) == 0 ? mesh.release() : nullptr;
 }
 
-// Builds the tree; returns the seconds of rtcCommitScene, negative where Embree reports an error.
+// Builds the tree; returns the seconds of rtcCommitScene, negative if Embree reports an error.
 double shim_commit(Mesh* mesh) {
     const auto start = std::chrono::steady_clock::now();
     rtcCommitScene(mesh->scene);
@@ -182,12 +182,12 @@ double shim_commit(Mesh* mesh) {
 
 void shim_release(Mesh* mesh) { delete mesh; }
 
-// Bytes that Embree holds for the mesh now; the vertex and index arrays are not Embree's and don't count.
+// Bytes that Embree has allocated for the mesh; the vertex and index arrays are not Embree's and don't count.
 std::ptrdiff_t shim_bytes(const Mesh* mesh) { return mesh->bytes; }
 
 std::ptrdiff_t shim_property(const Mesh* mesh, int property) { return rtcGetDeviceProperty(mesh->device, property); }
 
-// Sets or clears flush-to-zero and denormals-are-zero on the calling thread; returns the control word as it was.
+// Sets or clears flush-to-zero and denormals-are-zero on the calling thread; returns the former control word.
 unsigned shim_flush_denormals(int enabled) {
     constexpr unsigned flush_to_zero = 0x8000, denormals_are_zero = 0x0040;
     const unsigned before = _mm_getcsr();
@@ -196,7 +196,7 @@ unsigned shim_flush_denormals(int enabled) {
     return before;
 }
 
-// Gives freed memory back to the system, where the allocator can.
+// Gives freed memory back to the system, if the allocator can.
 void shim_trim_heap() {
 #ifdef __GLIBC__
     malloc_trim(0);
@@ -221,7 +221,7 @@ void shim_intersect(const Mesh* mesh, const Rays* rays, float* t, std::int32_t* 
     }
 }
 
-// The same for wive's renderer: ForeignTracer in cpu/render.h, the mesh as its context.
+// Closest hits for wive's renderer: a ForeignTracer (cpu/render/render.h) with the mesh as its context.
 void shim_trace(const void* mesh, std::size_t count, const float* origins, const float* directions, float tmin,
                 float tmax, float* t, std::int32_t* prim, float* uv) {
     const Rays rays{count, origins, directions, &tmin, &tmax, 0, 0};
@@ -236,7 +236,7 @@ void shim_occluded(const Mesh* mesh, const Rays* rays, std::uint8_t* occluded) {
     for (std::size_t i = 0; i < rays->count; ++i) {
         rays->load(i, ray);
         rtcOccluded1(mesh->scene, &ray, &arguments);
-        occluded[i] = ray.tfar < 0.0f;  // Embree answers with tfar = -inf
+        occluded[i] = ray.tfar < 0.0f;  // Embree reports a hit by tfar = -inf
     }
 }
 

@@ -1,4 +1,4 @@
-// How long a load waits for memory: a pointer chase through one random cycle over an array no cache holds.
+// Latency of a load from memory: a pointer chase through one random cycle over an array larger than every cache.
 
 #include <sys/mman.h>
 
@@ -17,7 +17,7 @@ struct alignas(64) Line {
     const Line* next;
 };
 
-// CPU time of this thread: a shared machine's other work does not count.
+// CPU time of this thread, which excludes other work of a shared machine.
 double thread_seconds() {
     timespec now{};
     clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
@@ -26,8 +26,8 @@ double thread_seconds() {
 
 }  // namespace
 
-// Seconds a load of a chain of `loads` that wanders over `bytes` of memory, in huge pages where the system has
-// them: the least of eight parts of the chain. Negative where there is not so much memory.
+// Seconds per load in a chain of `loads` over `bytes` of memory, in huge pages if the system has them: the least of
+// eight parts of the chain. Negative if there is not enough memory.
 extern "C" double memory_latency(std::size_t bytes, std::size_t loads) {
     constexpr std::size_t huge_page = std::size_t{2} << 20;
     const std::size_t count = bytes / sizeof(Line);

@@ -1,1 +1,1 @@
-"""What benches share: options, scenes, rays, timing, reports."""
+"""Modules that benches share: options, scenes, rays, timing, reports."""

@@ -9,13 +9,13 @@ Accuracy = Literal["fast", "watertight"]
 Nodes = Literal["float32", "compressed"]
 Quality = Literal["medium", "high"]
 
-ACCURACIES: tuple[Accuracy, ...] = ("fast", "watertight")  # those that Embree has a counterpart to
+ACCURACIES: tuple[Accuracy, ...] = ("fast", "watertight")  # Embree has a counterpart to each
 NODES: tuple[Nodes, ...] = ("float32", "compressed")
 QUALITIES: tuple[Quality, ...] = ("medium", "high")
 
 
 def listed(choices: Sequence[str] = ()) -> Callable[[str], tuple[str, ...]]:
-    """A parser of names with commas between them, each among the choices where there are any."""
+    """A parser of names with commas between them, each one of the choices if any are given."""
 
     def names(text: str) -> tuple[str, ...]:
         found = tuple(name.strip() for name in text.split(",") if name.strip())
@@ -41,12 +41,12 @@ def numbers(text: str) -> tuple[int, ...]:
 
 
 def in_flights(text: str) -> tuple[int, ...]:
-    """Numbers of rays in flight with commas between them; "tuned" is 0, the core's own choice."""
+    """Numbers of rays in flight with commas between them; "tuned" is 0, which lets the core choose."""
     return tuple(0 if part.strip() == "tuned" else numbers(part)[0] for part in text.split(","))
 
 
 def scene_parser(name: str, description: str | None) -> argparse.ArgumentParser:
-    """A parser with what every bench over scenes takes."""
+    """A parser with the options of every bench over scenes."""
     parser = result_parser(name, description)
     parser.add_argument("--scenes", type=listed(), default=(), help="names of scenes")
     parser.add_argument(
@@ -58,11 +58,13 @@ def scene_parser(name: str, description: str | None) -> argparse.ArgumentParser:
 
 
 def result_parser(name: str, description: str | None) -> argparse.ArgumentParser:
-    """A parser with what every bench takes."""
+    """A parser with the options of every bench."""
     summary = (description or "").split("\n")[0]
     parser = argparse.ArgumentParser(prog=f"python -m bench {name}", description=summary)
     parser.add_argument(
-        "--quick", action="store_true", help="few rays and rounds: shows that it runs, no result"
+        "--quick",
+        action="store_true",
+        help="few rays and rounds: shows that the bench runs, measures nothing",
     )
     parser.add_argument(
         "--out", type=Path, help="folder for results; default bench/results, for partial runs one in ~/.cache"

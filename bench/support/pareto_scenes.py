@@ -1,4 +1,4 @@
-"""What accuracies, node forms and precisions keep of the speed of `fast`, on scenes: for `bench pareto`."""
+"""Speed of accuracies, node forms and precisions relative to `fast`, on scenes: for `bench pareto`."""
 
 from collections.abc import Iterator, Sequence
 
@@ -22,7 +22,7 @@ MEAN_COLUMNS = ["contender", "mean_mrays", "lowest_mrays", "mean_single", "lowes
 
 
 def scene_rows(mesh: Mesh, quick: bool, effort: Effort) -> Iterator[report.Row]:
-    """One row per kind of rays and contender; kept: of the speed of `fast`, measured in turn."""
+    """One row per kind of rays and contender; `kept` is its speed over that of `fast`, measured in turn."""
     found = wive_contenders(mesh.vertices, mesh.faces)
     recorded = recorded_rays(mesh)
     for kind in KINDS:
@@ -41,7 +41,7 @@ def scene_rows(mesh: Mesh, quick: bool, effort: Effort) -> Iterator[report.Row]:
 
 
 def mean_rows(rows: Sequence[report.Row]) -> list[report.Row]:
-    """Geometric mean and lowest share kept, per contender."""
+    """Geometric mean and lowest of the shares kept, per contender."""
     means = []
     for name in dict.fromkeys(row["contender"] for row in rows):
         mine = [row for row in rows if row["contender"] == name]

@@ -1,4 +1,4 @@
-"""The rays that benches trace: recorded once per mesh, so that every side and run sees the same arrays."""
+"""The rays that benches trace: recorded once per mesh, so that every side and run traces the same arrays."""
 
 import hashlib
 import os
@@ -12,15 +12,16 @@ from numpy.typing import NDArray
 from bench.contenders.compiled_shim import cache_folder
 from bench.support.scenes import Camera, Mesh
 
-GENERATOR_VERSION = 1  # part of the cache's key: raise it when rays change
+GENERATOR_VERSION = 1  # part of the cache's key: raise it if the rays change
 
 PRIMARY_SIDE = 512  # pixels of the square picture: 262 k rays
-DIFFUSE_SIDE = 362  # of the picture that paths start from: up to 8 x 131 k rays
+DIFFUSE_SIDE = 362  # pixels of the square picture that paths start from: up to 8 x 131 k rays
 BOUNCES = 8
 RANDOM_COUNT = 500_000
 SHADOW_PER_HIT = 2
-SHADOW_REACH = 0.1  # tmax of shadow rays and
-SPAWN_OFFSET = 1e-5  # distance of new origins from the surface, both in diagonals of the bounding box
+# In diagonals of the bounding box:
+SHADOW_TMAX = 0.1
+SPAWN_OFFSET = 1e-5  # distance of new origins from the surface
 
 Array = NDArray[np.float32]
 # Closest hits: origins, directions -> t (n,), inf on a miss, and unit normals (n,3) of the triangles hit.
@@ -43,16 +44,16 @@ class Rays:
 
     @property
     def arrays(self) -> tuple[Array, Array, Array, Array]:
-        """What both sides take: origins, directions, tmin, tmax."""
+        """The arguments of both sides: origins, directions, tmin, tmax."""
         return self.origins, self.directions, self.tmin, self.tmax
 
     @property
     def any_hit(self) -> bool:
-        """Whether the set asks only if something is in the way."""
+        """Whether the set is for any-hit queries."""
         return self.kind == "shadow"
 
     def thinned(self, count: int, run: int = 256) -> "Rays":
-        """About `count` of the rays: runs of neighbours, evenly spread, so that coherence stays as it is."""
+        """About `count` of the rays: evenly spread runs of neighbours, to keep the set's coherence."""
         if len(self) <= count:
             return self
         starts = np.linspace(0, len(self) - run, max(1, count // run)).astype(np.int64)
@@ -86,7 +87,7 @@ def bounce(
     offset: float,
     rng: np.random.Generator,
 ) -> tuple[Array, Array]:
-    """Cosine-distributed rays from where the given ones hit, on the side they came from; misses drop out."""
+    """Cosine-distributed rays from the hits, on the side that the given rays came from; misses drop out."""
     hit = np.isfinite(t)
     arriving = directions[hit].astype(np.float64)
     points = origins[hit] + t[hit, None].astype(np.float64) * arriving
@@ -98,18 +99,18 @@ def bounce(
 
 
 def random_rays(mesh: Mesh, count: int, rng: np.random.Generator) -> tuple[Array, Array]:
-    """From random points of the bounding box towards random points of it."""
+    """Rays from random points of the bounding box towards random points of it."""
     lowest, highest = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
     start, end = rng.uniform(lowest, highest, (2, count, 3))
     return _float32(start), _float32(_unit(end - start))
 
 
 def generate(mesh: Mesh, trace: Tracer) -> dict[str, Rays]:
-    """Every set of rays for a mesh, by kind."""
+    """The sets of rays for a mesh, by kind."""
     seed = int.from_bytes(hashlib.sha256(mesh.name.encode()).digest()[:8], "little")
     rng = np.random.default_rng([seed, GENERATOR_VERSION])
     offset = SPAWN_OFFSET * mesh.diagonal
-    reach = {"shadow": SHADOW_REACH * mesh.diagonal}
+    tmax = {"shadow": SHADOW_TMAX * mesh.diagonal}
     sets = {"primary": camera_rays(mesh.camera, PRIMARY_SIDE, rng)}
 
     seen = [(*sets["primary"], *trace(*sets["primary"]))] * SHADOW_PER_HIT
@@ -123,15 +124,13 @@ def generate(mesh: Mesh, trace: Tracer) -> dict[str, Rays]:
     sets["diffuse"] = _joined(depths)
     sets["random"] = random_rays(mesh, RANDOM_COUNT, rng)
     return {
-        kind: Rays(
-            kind, *sets[kind], np.zeros(1, np.float32), np.full(1, reach.get(kind, np.inf), np.float32)
-        )
+        kind: Rays(kind, *sets[kind], np.zeros(1, np.float32), np.full(1, tmax.get(kind, np.inf), np.float32))
         for kind in KINDS
     }
 
 
 def recorded_rays(mesh: Mesh, trace: Tracer | None = None) -> dict[str, Rays]:
-    """The mesh's rays by kind, from the cache; where missing, generated (by wive's hits) and kept there."""
+    """The mesh's rays by kind, from the cache; if missing, generated (with wive's hits) and stored there."""
     path = _cache_path(mesh)
     if not path.exists():
         sets = generate(mesh, trace or wive_tracer(mesh))
@@ -153,7 +152,7 @@ def recorded_rays(mesh: Mesh, trace: Tracer | None = None) -> dict[str, Rays]:
 
 
 def wive_tracer(mesh: Mesh) -> Tracer:
-    """Closest hits and normals by wive itself."""
+    """Closest hits and normals by wive."""
     import wive
 
     scene = wive.Scene(mesh.vertices, mesh.faces)

@@ -1,4 +1,4 @@
-"""What every bench leaves behind: a printed table, a JSON file with the machine it ran on, a PNG figure."""
+"""The output of every bench: a printed table, a JSON file with the machine it ran on, a PNG figure."""
 
 import datetime
 import importlib.metadata
@@ -22,7 +22,7 @@ Row = dict[str, Any]
 
 
 def environment() -> Row:
-    """The machine and the versions that numbers were taken on."""
+    """The machine and the versions that the numbers belong to."""
     import wive
     from wive import _cpu
 
@@ -42,7 +42,7 @@ def environment() -> Row:
 
 
 def print_table(rows: Sequence[Row], columns: Sequence[str], title: str = "") -> None:
-    """Rows as aligned text: numbers to the right, floats with three decimals, - where there is no value."""
+    """Prints rows as aligned text: numbers to the right, floats with three decimals, - for no value."""
     if not rows:
         return
     cells = [[_text(row.get(column)) for column in columns] for row in rows]
@@ -64,15 +64,15 @@ def print_table(rows: Sequence[Row], columns: Sequence[str], title: str = "") ->
 
 
 def print_progress(row: Row, columns: Sequence[str]) -> None:
-    """One row as it comes in, on standard error."""
+    """Prints one row on standard error."""
     print("  ".join(_text(row[column]) for column in columns), file=sys.stderr, flush=True)
 
 
 def save(name: str, content: Row, figure: "Figure | None", folder: Path | None, *, whole: bool) -> Path:
     """Writes NAME.json and NAME.png; returns the JSON file's path.
 
-    They go into the folder given; else a whole run's go into bench/results and a partial one's into the
-    cache, so that it never replaces results that the docs quote.
+    They go into the folder given, or else into bench/results after a whole run and into the cache after a
+    partial one, which must not replace results that the docs quote.
     """
     folder = folder or (RESULTS if whole else partial_folder())
     path = folder / f"{name}.json"
@@ -90,7 +90,7 @@ def partial_folder() -> Path:
 
 
 def write(path: Path, content: Row) -> None:
-    """Writes the content as JSON, and its folder if there is none."""
+    """Writes the content as JSON; creates the folder if there is none."""
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(to_json(content))
 
@@ -114,7 +114,7 @@ def _json(value: object, depth: int) -> str:
 
 
 def _holds_rows(value: object) -> bool:
-    """Whether it is a list of dicts or lists, or a dict with such a list anywhere in it."""
+    """Whether the value is a list of dicts or lists, or a dict that contains such a list at any depth."""
     if isinstance(value, dict):
         return any(_holds_rows(part) for part in value.values())
     return isinstance(value, list) and any(isinstance(item, dict | list) for item in value)
@@ -144,7 +144,7 @@ def _proc_cpuinfo(field: str) -> str | None:
 
 
 def _cpu_model() -> str:
-    """The model's name and, as virtual machines shorten it, its family and model numbers."""
+    """The model's name, and its family and model numbers, as virtual machines shorten the name."""
     name = _proc_cpuinfo("model name")
     if name is None:
         return platform.processor() or platform.machine()
@@ -157,7 +157,7 @@ def _isa() -> list[str]:
 
 
 def _commit() -> str | None:
-    """HEAD's hash, with "+" where the tree has changes that are not in it."""
+    """HEAD's hash, with "+" if the working tree has other changes."""
 
     def git(*arguments: str) -> str | None:
         command = ["git", "-C", str(REPOSITORY), *arguments]

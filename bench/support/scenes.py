@@ -29,9 +29,10 @@ LARGEST = "furball_embree_tubes_tiled_2x2"  # 10.9 million triangles
 # Scenes derived from others: NAME_tiled_4x4, and terrain_1000k of about a million triangles.
 TILED = re.compile(r"(?P<base>.+)_tiled_(?P<columns>\d+)x(?P<rows>\d+)")
 RESAMPLED = re.compile(r"terrain_(?P<thousands>\d+)k")
-TILE_PITCH = 1.05  # distance of neighbouring tiles over their size,
-TILE_TURN = 0.12  # largest turn about the up direction in radians, and
-TILE_LIFT = 0.02  # highest lift over the height, so that no two tiles are alike
+TILE_PITCH = 1.05  # distance of neighbouring tiles over their size
+# No two tiles are equal:
+TILE_TURN = 0.12  # largest turn about the up direction, radians
+TILE_LIFT = 0.02  # largest lift over the height
 
 
 @dataclass(frozen=True)
@@ -143,7 +144,7 @@ def _environment_folders() -> list[str]:
 
 
 def terrain(triangles: int | None = None) -> Mesh:
-    """Real terrain that matplotlib ships: 344 x 403 elevations, two triangles between any four neighbours.
+    """Terrain of matplotlib's sample data: 344 x 403 elevations, two triangles per four neighbours.
 
     With a number of triangles, elevations are interpolated on a grid that makes about so many.
     """
@@ -179,7 +180,7 @@ def _resampled(height: NDArray[np.floating], triangles: int) -> NDArray[np.float
 
 
 def tiled(mesh: Mesh, columns: int, rows: int) -> Mesh:
-    """Copies of a mesh on a grid across its up direction, each turned and lifted a little, from outside."""
+    """Copies of a mesh on a grid across its up direction, each turned and lifted a little; camera outside."""
     rng = np.random.default_rng([columns, rows])
     up = int(np.argmax(np.abs(mesh.camera.up)))
     across = [axis for axis in range(3) if axis != up]

@@ -1,6 +1,6 @@
 """Two sides measured in turn: A, B, A, B, ... on one pinned core, and the median of the pairwise ratios.
 
-On a shared machine absolute speed drifts; two neighbours in time see the same machine, so their ratio holds.
+On a shared machine absolute speed drifts; the ratio of two runs right after each other hardly does.
 """
 
 import os
@@ -14,7 +14,7 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Comparison:
-    """How much faster our side is: their seconds over ours, the median and quartiles of all rounds."""
+    """Their seconds over ours, the median and quartiles over all rounds: above 1 our side is faster."""
 
     ratio: float
     low: float
@@ -25,12 +25,12 @@ class Comparison:
 
     @property
     def uncertainty(self) -> float:
-        """Of the ratio, relative: a median of n varies by about the interquartile range over sqrt(n)."""
+        """The relative uncertainty of the ratio: interquartile range over sqrt(n), about a median's of n."""
         return float((self.high - self.low) / self.ratio / self.rounds**0.5)
 
     @classmethod
     def of(cls, our_seconds: Sequence[float], their_seconds: Sequence[float]) -> "Comparison":
-        """Of seconds taken in turn, round by round."""
+        """The comparison of seconds measured in turn, round by round."""
         ratios = np.divide(their_seconds, our_seconds)
         low, ratio, high = (float(q) for q in np.quantile(ratios, (0.25, 0.5, 0.75)))
         medians = (float(np.median(our_seconds)), float(np.median(their_seconds)))
@@ -39,7 +39,7 @@ class Comparison:
 
 @dataclass(frozen=True)
 class Effort:
-    """When to stop: once the median's uncertainty is below `precision`, or after `most` rounds."""
+    """When to stop: if the median's uncertainty is below `precision`, or after `most` rounds."""
 
     least: int = 7
     most: int = 15
@@ -56,7 +56,7 @@ def core_count() -> int:
 
 @contextmanager
 def one_core() -> Iterator[None]:
-    """Pins the calling thread to the last core it may run on, where the system knows how."""
+    """Pins the calling thread to the last core it may run on, if the system can."""
     if not hasattr(os, "sched_setaffinity"):
         yield
         return
@@ -69,9 +69,9 @@ def one_core() -> Iterator[None]:
 
 
 def timed(work: Callable[[], object]) -> Callable[[], float]:
-    """The same work, done by one thread, as a function that returns the seconds of CPU time it took.
+    """A function that does the work, on one thread, and returns its seconds of CPU time.
 
-    CPU time leaves out the moments in which a shared core ran somebody else's process.
+    CPU time excludes the time in which a shared core runs other processes.
     """
 
     def run() -> float:
@@ -83,7 +83,7 @@ def timed(work: Callable[[], object]) -> Callable[[], float]:
 
 
 def wall_timed(work: Callable[[], object]) -> Callable[[], float]:
-    """The same work as a function that returns its wall-clock seconds: for work on several threads."""
+    """A function that does the work and returns its wall-clock seconds: for work on several threads."""
 
     def run() -> float:
         start = time.perf_counter()
@@ -94,12 +94,12 @@ def wall_timed(work: Callable[[], object]) -> Callable[[], float]:
 
 
 def compare(ours: Callable[[], float], theirs: Callable[[], float], effort: Effort) -> Comparison:
-    """Runs both in turn, each returning its seconds, until the ratio holds. Warming up is the caller's."""
+    """Runs both in turn, each returning its seconds, until the ratio is known. The caller warms up."""
     return compare_in_turn([theirs, ours], effort)[1]
 
 
 def compare_in_turn(runs: Sequence[Callable[[], float]], effort: Effort) -> list[Comparison]:
-    """Runs all in turn until every ratio holds: how much faster each is than the first."""
+    """Runs all in turn until every ratio is known: the first one's seconds over each one's."""
     seconds: list[list[float]] = [[] for _ in runs]
     while True:
         for run, taken in zip(runs, seconds, strict=True):
@@ -111,5 +111,5 @@ def compare_in_turn(runs: Sequence[Callable[[], float]], effort: Effort) -> list
 
 
 def geometric_mean(ratios: list[float]) -> float:
-    """The geometric mean; NaN of nothing."""
+    """The geometric mean; NaN if there are no ratios."""
     return float(np.exp(np.mean(np.log(ratios)))) if ratios else float("nan")
