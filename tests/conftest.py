@@ -1,7 +1,7 @@
-"""Fixtures for every test: `backend` runs it on each one there is, `scenes` loads large meshes.
+"""Fixtures for every test: `backend` runs a test on each backend, `scenes` loads large meshes.
 
-`pytest --device cuda:0`, or WIVE_TEST_DEVICE=cuda:0, runs the tests of backend "warp" on that device; one
-that can't be used ends the run with the reason. Without it they run on Warp's CPU device.
+`pytest --device cuda:0`, or WIVE_TEST_DEVICE=cuda:0, runs the tests of backend "warp" on that device; a
+device that can't be used ends the run with the reason. The default is Warp's CPU device.
 """
 
 import os
@@ -27,7 +27,7 @@ Mesh = tuple[np.ndarray, np.ndarray]
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    parser.addoption("--slow", action="store_true", help="run the tests that take minutes, too")
+    parser.addoption("--slow", action="store_true", help="also run the tests that take minutes")
     parser.addoption(
         "--device",
         default=os.environ.get("WIVE_TEST_DEVICE"),
@@ -57,7 +57,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 @pytest.fixture(params=BACKENDS)
 def backend(request: pytest.FixtureRequest) -> str:
-    """The name of each backend in turn; skips where this machine can't run it."""
+    """The name of each backend in turn; skips if this machine can't run it."""
     name: str = request.param
     if not BACKENDS[name].usable:
         pytest.skip(f"{name}: {BACKENDS[name].reason}")
@@ -66,7 +66,7 @@ def backend(request: pytest.FixtureRequest) -> str:
 
 @pytest.fixture(scope="session")
 def device(pytestconfig: pytest.Config) -> str:
-    """The Warp device that tests run on; skips where there is no Warp."""
+    """The Warp device that tests run on; skips if Warp can't be used."""
     if not BACKENDS["warp"].usable:
         pytest.skip(f"warp: {BACKENDS['warp'].reason}")
     return pytestconfig.stash[DEVICE]
@@ -79,7 +79,7 @@ def usable_backends() -> list[str]:
 
 @pytest.fixture(scope="session")
 def scenes() -> Callable[[str], Mesh]:
-    """A function from a shared scene's name to its vertices and faces; skips where the scene is not here."""
+    """A function from a scene's name to its vertices and faces; skips if the scene is missing."""
 
     def load(name: str) -> Mesh:
         path = SCENES / f"{name}.npz"

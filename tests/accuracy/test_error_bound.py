@@ -20,7 +20,7 @@ FLOAT_ROUNDOFF = 2.0**-24
 def test_t_is_within_its_bound_of_the_exact_distance(make: Callable[[], Set], accuracy: str) -> None:
     hits, exact = traced(make, accuracy)
     assert broken(hits, exact, hits.error_bound) == 0
-    # and it is not because nothing is promised
+    # and not because the bounds are infinite
     assert np.isfinite(hits.error_bound[hits.mask]).mean() > 0.95
 
 
@@ -103,7 +103,7 @@ def test_misses_have_no_bound_and_t_beyond_float32_an_infinite_one() -> None:
     assert hits.t[2] == np.inf and hits.error_bound[2] == np.inf
 
 
-def test_hits_made_by_hand_say_why_they_have_no_bound() -> None:
+def test_hits_made_by_hand_give_the_reason_for_having_no_bound() -> None:
     hits = wive.Hits(np.zeros(1, np.float32), np.zeros(1, np.int32), np.zeros((1, 2), np.float32), *TRIANGLE)
     with pytest.raises(ValueError, match=r"^error_bound needs hits that a scene returned"):
         _ = hits.error_bound

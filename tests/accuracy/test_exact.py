@@ -1,6 +1,6 @@
-"""accuracy="exact" answers as exact arithmetic does, to the bit, on every backend.
+"""accuracy="exact" returns the bits of exact arithmetic on every backend.
 
-The oracle (oracle.py) is brute force in integers and fractions.
+The oracle (support/oracle.py) is brute force in integers and fractions.
 """
 
 import functools
@@ -24,7 +24,7 @@ CPU_KERNELS = [name for name, reason in _cpu.kernels().items() if not reason]
 def answers(
     backend: str, rays: HardSet, tmin: np.ndarray, tmax: np.ndarray, accuracy: str = "exact"
 ) -> Truth:
-    if "." in backend:  # a form of a CPU kernel that has no name as a backend
+    if "." in backend:  # a kernel that no backend is named after
         bvh = _cpu.Bvh(rays.vertices, rays.faces, accuracy)
         t, prim, uv, _ = bvh.intersect(backend, rays.origins, rays.directions, tmin, tmax)
         return Truth(t, prim, uv, bvh.occluded(backend, rays.origins, rays.directions, tmin, tmax)[0])
@@ -41,7 +41,7 @@ def answers(
 @pytest.mark.parametrize("name", SETS)
 def test_hits_are_those_of_exact_arithmetic(backend: str, name: str) -> None:
     right = truth_of(name)
-    assert right.occluded.mean() > 0.02  # the set asks something
+    assert right.occluded.mean() > 0.02  # enough rays hit
     assert len(wrong_rays(answers(backend, hard_set(name), ZERO, INFINITE), right)) == 0
 
 
@@ -97,7 +97,7 @@ def test_these_sets_can_tell_exact_from_rounded(accuracy: str) -> None:
 
 @pytest.mark.parametrize("name", ["small integers", "thin walls", "subnormal distances", "mixed exponents"])
 def test_limits_are_kept_to_exactly(backend: str, name: str) -> None:
-    """Limits at the reported t, which lies on either side of the exact one or on it, and one float off."""
+    """Limits at the reported t, which may be below, at or above the exact t, and at its neighbours."""
     first = truth_of(name)
     hit = np.flatnonzero(first.occluded)[:300]
     rays = hard_set(name)
@@ -149,14 +149,14 @@ def test_small_scenes_of_few_bits_are_exact(
         assert len(wrong_rays(Truth(t, prim, uv, occluded), right)) == 0
 
 
-def test_the_filters_error_bound_holds_and_is_not_idle() -> None:
+def test_the_filters_error_bound_holds_and_is_not_far_too_large() -> None:
     used = {name: share_of_bound_used(name) for name in SETS}
     assert all(share <= 1 for share in used.values()), used
     assert max(used.values()) > 0.02
 
 
 def share_of_bound_used(name: str) -> float:
-    """The largest error over its bound of the weights, computed as in triangle_exact.h, against integers.
+    """The largest error of the weights over its bound; weights as in triangle_exact.h, errors by integers.
 
     The bound is the one derived in docs/accuracy.md.
     """
@@ -182,12 +182,12 @@ def share_of_bound_used(name: str) -> float:
     met = meetings(*rays)
     scale = unit_of(rays.vertices, rays.origins) * 2 + unit_of(rays.directions)
     forward = integers(rays.directions, unit_of(rays.directions))[np.arange(len(d)), axis]
-    shift = 2400  # so that what the floats hold are integers
+    shift = 2400  # makes every float an integer
     used = 0.0
     for k in range(3):
         i, j = (k + 1) % 3, (k + 2) % 3
         weight = x[i] * y[j] - y[i] * x[j]
-        # All times the direction's longest component, in units of 2^(direction's unit - shift).
+        # All are multiplied by the direction's longest component, in units of 2^(direction's unit - shift).
         for ray, face in np.ndindex(weight.shape):
             along_axis = int(forward[ray])
             exact = int(met.weights[ray, face, k]) << (scale - unit_of(rays.directions) + shift)

@@ -1,4 +1,4 @@
-"""In exact mode `count` and `intersect_all` pass closed surfaces consistently: parity is always right.
+"""In exact mode `count` and `intersect_all` cross closed surfaces consistently: parity is always right.
 
 The oracle moves the rays by an amount too small to matter otherwise, in integers, and has no rule for ties.
 """
@@ -66,7 +66,7 @@ def test_rays_at_vertices_and_edges_leave_a_sphere_once(backend: str, place: tup
 
 
 def test_without_the_rule_edges_would_count_twice(backend: str) -> None:
-    """What `watertight` promises is no leak, not a count: on these rays its counts are wrong."""
+    """`watertight` promises that nothing leaks, not a right count: on these rays its counts are wrong."""
     rays, right, _ = voxel_case(1)
     scene = wive.Scene(rays.vertices, rays.faces, backend=backend, accuracy="watertight")
     assert (scene.count(rays.origins, rays.directions) != right).mean() > 0.1
@@ -89,7 +89,7 @@ def test_all_hits_are_the_crossings_with_exact_numbers(backend: str) -> None:
 
 
 def test_all_hits_of_rounded_numbers_are_the_crossings(backend: str) -> None:
-    """Numbers of full width: each hit is one of the closed triangles', and rightly rounded."""
+    """Coordinates with all bits used: each hit is on a closed triangle, and its t is rightly rounded."""
     rays = hard_set("thin walls")
     rays = rays._replace(origins=rays.origins[:200], directions=rays.directions[:200])
     scene = wive.Scene(rays.vertices, rays.faces, backend=backend, accuracy="exact")

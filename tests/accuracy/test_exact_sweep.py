@@ -8,7 +8,7 @@ from support.oracle import cross, dot
 import wive
 
 RAYS = 500_000
-REACH = 64  # of coordinates and directions: every product below fits into 64 bits with room to spare
+REACH = 64  # of coordinates and directions: every product below fits into 64 bits
 
 
 def thin_integers(random: np.random.Generator, count: int) -> tuple[np.ndarray, np.ndarray]:
@@ -32,8 +32,8 @@ def closest(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """t, prim, uv of the closest hit in [0, inf) of integer rays on (f,3,3) integer corners.
 
-    Quotients of integers below 2^24 are never so near to a tie between floats that rounding them to double
-    first would matter.
+    No quotient of integers below 2^24 is so near to a tie between floats that rounding it to double first
+    would change the result.
     """
     count = len(origins)
     prim = np.full(count, -1, np.int32)
@@ -53,7 +53,7 @@ def closest(
         height, determinant = height[hit], np.abs(determinant[hit])
         nearer = (
             height * best_determinant[hit] < best_height[hit] * determinant
-        )  # faces come by ascending number
+        )  # faces are in ascending order
         at = hit[nearer]
         prim[at], best_height[at], best_determinant[at] = face, height[nearer], determinant[nearer]
         best_weights[at] = weights[nearer, 1:]
@@ -81,7 +81,7 @@ def assert_all_exact(
     fast = wive.Scene(vertices, faces, accuracy="fast").intersect(origins, directions)
     assert ((fast.prim != prim) | (fast.t != t) | (fast.uv != uv).any(axis=1))[
         prim >= 0
-    ].any()  # they can tell
+    ].any()  # the rays tell exact from rounded arithmetic
 
 
 @pytest.mark.slow

@@ -1,4 +1,4 @@
-"""`Hits.error_bound` and `Hits.spawn` hold in float64, where the judge is as precise as what it judges."""
+"""`Hits.error_bound` and `Hits.spawn` hold in float64, in which they are computed themselves."""
 
 from collections.abc import Callable
 from fractions import Fraction
@@ -34,7 +34,7 @@ import wive
 from wive._internal import error_bounds, spawn
 
 ACCURACIES = ("fast", "watertight")
-# Sizes that float32 does not have, and needles that are only as thin as double can tell.
+# Sizes beyond float32's range, and needles as thin as double just resolves.
 SHAPES = [
     *EXPONENTS[::3], *TRANSLATED, *SLIVERS,
     (1e-30, 1e-30, 1.0), (1e16, 1e16, 1.0), (1e9, 1e-3, 1.0), (1.0, 1.0, 1e-7),
@@ -51,7 +51,7 @@ def extremes(dtype: type = np.float64) -> Set:
 
 
 def needles(dtype: type = np.float64) -> Set:
-    """As thin, and seen as flat, as double only just resolves."""
+    """Triangles as thin, and rays as flat, as double just resolves."""
     random = np.random.default_rng(10)
     corners, direction = random_triangles(random)
     corners[:, 2] = (corners[:, 0] + corners[:, 1]) / 2 + 10.0 ** random.uniform(
@@ -73,7 +73,7 @@ def test_t_is_within_its_bound_of_the_exact_distance(make: Callable[..., Set], a
 
 
 @pytest.mark.parametrize("accuracy", ACCURACIES)
-def test_what_double_can_not_tell_from_a_plane_it_does_not_bound(accuracy: str) -> None:
+def test_rays_that_double_can_not_tell_from_a_plane_have_no_bound(accuracy: str) -> None:
     vertices, faces, origins, directions = needles()
     hits = wive.Scene(vertices, faces, accuracy=accuracy).intersect(origins, directions)
     bounds = hits.error_bound[hits.mask]
@@ -185,7 +185,7 @@ def test_a_closed_body_at_survey_coordinates_is_not_left_from_inside(accuracy: s
     assert inwards.all() or accuracy == "fast"
 
 
-def test_sides_are_told_for_directions_of_any_length() -> None:
+def test_sides_are_right_for_directions_of_any_length() -> None:
     vertices, faces = TRIANGLE
     scene = wive.Scene(1e15 * vertices.astype(np.float64), faces)
     hits = scene.intersect([[2e14, 2e14, 0]], [[0, 0, 1]])

@@ -1,4 +1,4 @@
-"""Rays of float64 trees: closed surfaces do not leak anywhere; limits and detail are those of double."""
+"""Rays of float64 trees: closed surfaces never leak; limits and detail have double precision."""
 
 import numpy as np
 import pytest
@@ -27,7 +27,7 @@ def test_closed_sphere_never_leaks_at_any_scale_and_place(
 ) -> None:
     random = np.random.default_rng(3)
     for place in PLACES:
-        if radius < 1e-12 * np.abs(place).max() * 1e3:  # double knows no such sphere there
+        if radius < 1e-12 * np.abs(place).max() * 1e3:  # double can't represent such a sphere there
             continue
         mesh = sphere64(3, radius, place)
         assert hits_it(_cpu.Bvh(*mesh, nodes=nodes), kernel, *leaving(mesh, kind, 2000, random)).all()
@@ -48,7 +48,7 @@ def test_float32_loses_what_float64_keeps_in_utm_coordinates(kernel: str) -> Non
 
 
 @each_kernel
-def test_triangles_of_a_millimetre_are_told_apart_in_utm_coordinates(kernel: str) -> None:
+def test_triangles_of_a_millimetre_are_resolved_in_utm_coordinates(kernel: str) -> None:
     # A plane of squares of 1 mm, each ray into one triangle of them.
     side = 64
     i, j = (a.ravel() for a in np.meshgrid(np.arange(side), np.arange(side), indexing="ij"))
@@ -71,7 +71,7 @@ def test_triangles_of_a_millimetre_are_told_apart_in_utm_coordinates(kernel: str
 @each_kernel
 @each_form
 def test_a_hit_is_found_again_with_tmax_at_its_own_distance(kernel: str, nodes: str) -> None:
-    # Triangles seen edge-on: t is as sensitive as it gets, but never lies outside the triangle's boxes.
+    # Triangles seen edge-on: t is as sensitive as possible, but never lies outside the triangle's boxes.
     random = np.random.default_rng(7)
     across = np.linalg.qr(np.array([[1.0, 0.7, 0.3], [0, 1, 0], [0, 0, 1]]).T)[0].T
     basis = np.stack([across[1], across[2], across[0]])
@@ -157,7 +157,7 @@ def test_signed_zeros_and_tiny_components_all_hit_from_inside(kernel: str) -> No
 
 @each_kernel
 @pytest.mark.parametrize("accuracy", ACCURACIES)
-def test_rays_that_are_no_rays_miss(kernel: str, accuracy: str) -> None:
+def test_rays_without_direction_or_with_nan_miss(kernel: str, accuracy: str) -> None:
     bvh = _cpu.Bvh(*sphere64(2), accuracy)
     bad = [np.nan, np.inf, -np.inf]
     origins = np.zeros((8, 3))

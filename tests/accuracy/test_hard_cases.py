@@ -1,7 +1,7 @@
 """The hard cases of rays and triangles in both careful accuracies and node forms, on every CPU backend.
 
-The same on Warp's CPU device where a test says `backend`. Oracles are exact rationals (oracle.py), or
-geometry in double where what is asked is clear by more than the watertight test's error bound.
+Tests with `backend` also run on Warp's CPU device. Oracles are exact rationals (support/oracle.py), or
+geometry in double if the result is clear by more than the watertight test's error bound.
 """
 
 import functools
@@ -98,7 +98,7 @@ def test_watertight_hits_what_it_must_and_nothing_beyond_its_bound(cpu: str, nod
     found = answers(scene_of(rays, cpu, "watertight", nodes), rays)
     hit = np.flatnonzero(found.occluded)
     assert (distance[hit, found.prim[hit]] >= -1).all()
-    # Nothing that is inside for certain, and clearly ahead, lies before the reported hit.
+    # No triangle that the ray is certainly inside lies clearly before the reported hit.
     inside = distance > 1
     ahead = inside & (t > 1e-6 * np.median(np.abs(t[inside]))) if inside.any() else inside
     first = np.where(ahead, t, np.inf).min(axis=1)
@@ -108,7 +108,7 @@ def test_watertight_hits_what_it_must_and_nothing_beyond_its_bound(cpu: str, nod
     two_ulp = 2 * np.spacing(first[certain].astype(np.float32))
     assert found.occluded[certain].all()
     assert (found.t[certain] <= first[certain] + two_ulp).all()
-    # Where only one triangle is anywhere near the ray, its hit is as good as the nearest float.
+    # If only one triangle is near the ray, t is its exact distance to the nearest float.
     alone = np.flatnonzero(certain & ((distance > -1).sum(axis=1) == 1))
     assert np.array_equal(found.prim[alone], np.argmax(ahead[alone], axis=1))
     assert (np.abs(found.t[alone] - first[alone]) <= 2 * np.spacing(first[alone].astype(np.float32))).all()
@@ -162,7 +162,7 @@ def test_rays_in_the_plane_of_an_axis_aligned_wall_miss_it(
 
 @functools.cache
 def silhouette() -> tuple[HardSet, np.ndarray, Truth]:
-    """Rays past the edges of a box, at them and beside them by 2^-18, 2^-6; the third: how far outside."""
+    """Rays past the edges of a box, at them and beside them by 2^-18, 2^-6. Third result: how far outside."""
     random = np.random.default_rng(54)
     count = 900
     axis, along = random.integers(3, size=count), random.integers(0, 17, count) / 4

@@ -1,4 +1,4 @@
-"""What the hard cases ask about, of millions of rays: --slow, about half an hour on two cores."""
+"""The properties of the hard cases with millions of rays: --slow, about half an hour on two cores."""
 
 from collections.abc import Iterator
 
@@ -40,7 +40,7 @@ def leaks(scene: wive.Scene, rays: Rays) -> int:
 def test_ten_million_rays_at_vertices_and_edges_never_leak(
     backend: str, usable_backends: list[str], scale: float, place: tuple[float, ...]
 ) -> None:
-    """In exact mode on the first backend alone: what it decides in integers is the same code on all."""
+    """In exact mode on the first backend alone: all backends share the integer arithmetic."""
     if backend == "warp":
         pytest.skip("warp: a million, below")
     asked = FORMS if backend == usable_backends[0] else FORMS[:2]

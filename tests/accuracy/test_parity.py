@@ -1,7 +1,7 @@
 """Parity in exact mode against manifold3d, which casts rays by rules of its own and shares no code with wive.
 
-Its `ray_cast` keeps parity at vertices and edges, too, so it is asked about all kinds of rays; it works in
-double, where an end point is rounded, so that only parity can be compared, not each hit.
+Its `ray_cast` also keeps parity at vertices and edges, so all kinds of rays are compared. It works in double
+and rounds end points, so only parity is compared, not each hit.
 """
 
 import numpy as np
@@ -55,7 +55,7 @@ def test_parity_is_that_of_manifold3d_at_vertices_and_edges_and_anywhere(
 
 def test_parity_is_that_of_manifold3d_between_voxels(usable_backends: list[str]) -> None:
     """Axis rays, diagonals and rays at vertices, from inside and outside of a solid with holes."""
-    vertices, faces, _ = voxels(2)  # of which manifold3d keeps every triangle, as it does not of others
+    vertices, faces, _ = voxels(2)  # manifold3d keeps every triangle of this mesh
     origins, directions = surface_rays(vertices, 40, 1500)
     right = parity(manifold_of((vertices, faces)), origins, directions, 64.0)
     assert 0.1 < right.mean() < 0.9
@@ -67,7 +67,7 @@ def check(
 ) -> None:
     for backend in backends:
         if backend == "warp":
-            continue  # tests/test_exact_crossings.py holds it to the same counts
+            continue  # test_exact_crossings.py compares the other backends' counts
         for nodes in ("float32", "compressed"):
             scene = wive.Scene(*mesh, backend=backend, accuracy="exact", nodes=nodes)
             np.testing.assert_array_equal(scene.count(origins, directions) % 2, right)

@@ -1,7 +1,7 @@
-"""The suite can fail: faults of the usual kind, planted in NumPy copies of the arithmetic, are seen.
+"""The suite detects faults: usual mistakes, planted in NumPy copies of the arithmetic, make rays leak.
 
 The copies follow frame.h, slabs.h and triangle_watertight.h operation by operation in float32, so
-that they also say which triangles the compiled kernels must report.
+they also give the triangles that the compiled kernels must report.
 """
 
 import functools
@@ -66,7 +66,7 @@ def at_edges() -> tuple[Mesh, Mesh, np.ndarray, np.ndarray]:
 
 
 def accepted_of_both(fused: bool) -> np.ndarray:
-    """(n,2) which of the two triangles at its edge each ray passes the test of."""
+    """(n,2) whether each ray passes the test of either triangle at its edge."""
     (vertices, faces), rays, both, _ = at_edges()
     return np.stack([accepts(vertices[faces[both[:, k]]], *rays, fused) for k in (0, 1)], axis=1)
 
@@ -177,7 +177,7 @@ def test_slabs_without_their_slack_would_lose_triangles(place: tuple[float, ...]
         assert np.isin(triangle + len(faces) * ray, found).all()
 
 
-def test_fast_mode_leaks_on_rays_that_the_hard_cases_ask_about() -> None:
+def test_fast_mode_leaks_on_the_rays_of_the_hard_cases() -> None:
     random = np.random.default_rng(63)
     leaks = dict.fromkeys(("fast", "watertight", "exact"), 0)
     for level, scale, place in ((1, 1.0, (0, 0, 0)), (4, 1e-3, (1, 2, 3)), (4, 100.0, (5e4, -3e4, 2e4))):

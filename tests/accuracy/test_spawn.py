@@ -29,7 +29,7 @@ UTM = np.array([148376.0, 1234.0, -223423.0])
 @pytest.mark.parametrize("accuracy", ACCURACIES)
 @pytest.mark.parametrize("shape", EXPONENTS + TRANSLATED + SLIVERS)
 def test_spawned_rays_never_hit_their_own_triangle(shape: tuple[float, float, float], accuracy: str) -> None:
-    # Of rays aimed at slivers from beside, few hit.
+    # Few of the rays aimed at slivers from beside hit.
     for slope, hit in ((1.0, COUNT / 2), (1e-4, COUNT / 10)):
         scene, hits, incoming = hits_of(triangles(*shape), accuracy, slope)
         assert hits.mask.sum() > hit
@@ -90,20 +90,20 @@ def test_origins_move_by_no_more_than_64_units_in_the_last_place(
     moved = np.linalg.norm(hits.spawn(-directions) - hits.points(), axis=1)
     assert hits.mask.all()
     assert (moved <= 64 * np.spacing(np.maximum(size, coordinate).astype(np.float32))).all()
-    if accuracy == "exact":  # a rounding, and what double is unsure of
+    if accuracy == "exact":  # one rounding, and the error of double
         assert (moved <= 2 * np.spacing(coordinate.astype(np.float32))).all()
 
 
 @pytest.mark.parametrize("accuracy", ACCURACIES)
 @pytest.mark.parametrize("radius", [1e-6, 1.0, 1e6])
-def test_a_convex_body_is_left_for_good(radius: float, accuracy: str) -> None:
+def test_rays_that_leave_a_convex_body_never_hit_it_again(radius: float, accuracy: str) -> None:
     outwards, inwards = leave(wive.Scene(*sphere(5, radius), accuracy=accuracy), np.zeros(3), seed=5)
     assert not outwards.any()
     assert inwards.all() or accuracy == "fast"
 
 
 @pytest.mark.parametrize("accuracy", ["watertight", "exact"])
-def test_a_closed_body_far_away_is_not_left_from_inside(accuracy: str) -> None:
+def test_rays_inside_a_closed_body_far_away_hit_it(accuracy: str) -> None:
     vertices, faces = sphere(3, 1000.0)
     vertices = (vertices + UTM).astype(np.float32)
     _, inwards = leave(wive.Scene(vertices, faces, accuracy=accuracy), UTM, seed=7)
@@ -123,7 +123,9 @@ def tessellated_plane(slope: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
 
 @pytest.mark.parametrize("accuracy", ["watertight", "exact"])
 @pytest.mark.parametrize("slope", [(0, 0), (1, 2)])
-def test_a_tessellated_plane_far_away_is_left_for_good(slope: tuple[int, int], accuracy: str) -> None:
+def test_rays_that_leave_a_tessellated_plane_far_away_never_hit_it_again(
+    slope: tuple[int, int], accuracy: str
+) -> None:
     random = np.random.default_rng(6)
     vertices, faces = tessellated_plane(slope)
     weights = random.dirichlet(np.ones(3), 20_000)

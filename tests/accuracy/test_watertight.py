@@ -23,7 +23,7 @@ def aims(vertices: np.ndarray, faces: np.ndarray, kind: str, random: np.random.G
 
 
 def outwards(vertices: np.ndarray, targets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Rays from near the middle of the mesh to the targets, as float32 has them."""
+    """Rays from the middle of the mesh to the targets, both rounded to float32."""
     middle = (vertices.min(axis=0).astype(np.float64) + vertices.max(axis=0)) / 2
     origins = np.broadcast_to(middle.astype(np.float32), targets.shape)
     return origins, (targets - origins).astype(np.float32)
@@ -165,7 +165,7 @@ def test_directions_of_any_length_hit_a_wall(backend: str, length: float) -> Non
 
 
 def test_a_hit_is_found_again_with_tmax_at_its_own_distance(backend: str) -> None:
-    # Nearly coplanar triangles, rays nearly in their plane: t is as sensitive as it gets.
+    # Nearly coplanar triangles, rays nearly in their plane: t is as sensitive as possible.
     random = np.random.default_rng(10)
     across = np.linalg.qr(np.array([[1.0, 0.7, 0.3], [0, 1, 0], [0, 0, 1]]).T)[0].T
     flat = np.append(random.uniform(-1, 1, (1200, 2)), 3e-7 * random.standard_normal((1200, 1)), axis=1)

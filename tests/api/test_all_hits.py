@@ -164,7 +164,7 @@ def test_closed_sphere_is_passed_an_even_number_of_times_from_outside_and_an_odd
     assert (counts[outside] % 2 == 0).all() and (counts[inside] == 1).all()
 
 
-def test_rays_that_are_none_hit_nothing(backend):
+def test_invalid_rays_hit_nothing(backend):
     scene = wive.Scene(*TRIANGLE, backend=backend)
     origins, directions = np.tile(np.float32([0.25, 0.25, 0]), (6, 1)), np.tile(np.float32([0, 0, 1]), (6, 1))
     origins[0, 1], origins[1, 0], directions[2, 0] = np.nan, np.inf, np.nan
@@ -273,6 +273,6 @@ def test_more_hits_than_memory_holds_are_a_memory_error_and_nothing_leaks(thread
         capture_output=True,
         text=True,
         timeout=100,
-        cwd=tempfile.gettempdir(),  # not where a wive without its core could be imported from
+        cwd=tempfile.gettempdir(),  # not in the repository, whose source folder has no compiled core
     )
     assert run.stdout.split() == ["refused", "2000000"] * 3, run.stderr

@@ -1,4 +1,4 @@
-"""What queries return and how scenes behave, on every backend."""
+"""Results of queries and behaviour of scenes, on every backend."""
 
 import tracemalloc
 
@@ -90,7 +90,7 @@ def test_every_backend_returns_the_same_bits(usable_backends, accuracy):
         np.testing.assert_array_equal(first.occluded(*rays), other.occluded(*rays))
 
 
-def test_nonsense_rays_miss(backend):
+def test_invalid_rays_miss(backend):
     scene = wive.Scene(*sphere(), backend=backend)
     nan, inf = np.nan, np.inf
     good_origin, good_direction = [0.1, 0.2, -3], [0, 0, 1]
@@ -241,7 +241,7 @@ def test_stats_count_work_and_change_no_hit(backend):
     missed = ~hits.mask
     assert missed.any()
     for of_any, of_closest in zip(any_hit, closest, strict=True):
-        # Without a hit both visit all there is in the interval, in whatever order.
+        # Without a hit both visit every node in the interval, in any order.
         np.testing.assert_array_equal(of_any[missed], of_closest[missed])
         assert (of_any[hits.mask] >= 1).all()
 
@@ -258,7 +258,7 @@ def test_occluded_stops_at_the_first_hit(backend):
     assert stats.inner_nodes[0] < 20
 
 
-def test_a_scene_tells_its_size_bounds_and_options(backend):
+def test_a_scene_has_its_size_bounds_and_options(backend):
     vertices, faces = sphere(2, radius=2)
     scene = wive.Scene(vertices, faces, backend=backend, accuracy="fast")
     assert len(scene) == 320
@@ -274,7 +274,7 @@ def test_auto_is_the_first_usable_backend(usable_backends):
     assert [name for name in usable_backends if name != "warp"][-1] == "scalar"
 
 
-def test_backends_say_why_they_are_not_usable():
+def test_unusable_backends_give_a_reason():
     found = wive.backends()
     assert list(found) == ["avx512", "avx2", "scalar", "warp"]
     for backend in found.values():

@@ -116,7 +116,7 @@ def test_a_damaged_npy_header_is_damage_and_not_a_python_error(tmp_path):
         assert message(error) == f"{path}: not a file of rays, or damaged"
 
 
-def test_saving_where_nothing_can_be_written(tmp_path):
+def test_saving_into_a_folder_that_can_not_be_written(tmp_path):
     scene = wive.Scene(VERTICES, FACES)
     with pytest.raises(FileNotFoundError, match=r"output folder .* does not exist: create it first"):
         scene.save(tmp_path / "nowhere" / "scene")

@@ -1,4 +1,4 @@
-"""Bad input ends in one line: the argument, what was expected, what came."""
+"""Bad input ends in one line: the argument, the value expected, the value passed."""
 
 import pickle
 import sys
@@ -153,7 +153,7 @@ def no_warp(monkeypatch):
 
 
 @pytest.mark.usefixtures("no_warp")
-def test_a_backend_that_cannot_run_here_says_why_and_which_can(monkeypatch):
+def test_an_unusable_backend_gives_its_reason_and_the_usable_ones(monkeypatch):
     monkeypatch.setattr(
         wive._cpu, "kernels", lambda: {"avx512": "this CPU lacks AVX-512", "avx2": "", "scalar": ""}
     )

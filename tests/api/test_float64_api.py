@@ -1,4 +1,4 @@
-"""A scene of float64 vertices keeps them, and traces, answers and refuses accordingly."""
+"""A scene of float64 vertices keeps them, traces in float64 and returns float64."""
 
 import tracemalloc
 
@@ -174,7 +174,7 @@ def test_numbers_beyond_float32_are_ordinary_and_beyond_the_limit_named():
         assert "vert" in message(error)
 
 
-def test_nonsense_rays_miss(cpu):
+def test_invalid_rays_miss(cpu):
     vertices, faces = sphere(2)
     scene = wive.Scene(vertices.astype(np.float64), faces, backend=cpu)
     nan, inf = np.nan, np.inf

@@ -127,7 +127,7 @@ def test_trimesh_adapter_resolves_in_float64_what_float32_can_not():
         wive.trimesh.RayMeshIntersector(mesh, dtype=int)
 
 
-def test_points_inside_a_mesh_are_told_by_the_adapter_in_float64():
+def test_the_adapter_finds_points_inside_a_mesh_in_float64():
     trimesh = pytest.importorskip("trimesh")
     vertices, faces = survey(3)
     ours = wive.trimesh.RayMeshIntersector(trimesh.Trimesh(vertices, faces, process=False), dtype="float64")

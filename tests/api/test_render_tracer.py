@@ -1,4 +1,4 @@
-"""The renderer with its rays traced by a function from outside, as comparisons do."""
+"""The renderer with a foreign function as its tracer, as benches use it."""
 
 import ctypes
 

@@ -1,4 +1,4 @@
-"""`wive.trimesh.RayMeshIntersector` answers as trimesh's own where that is right, and follows its mesh."""
+"""`wive.trimesh.RayMeshIntersector` gives trimesh's own results if these are right, and follows its mesh."""
 
 import copy
 import pickle
@@ -21,7 +21,7 @@ def own(vertices, faces):
 
 
 def theirs(mesh):
-    """Trimesh's own, where its package is."""
+    """Trimesh's own intersector; skips if embreex is not installed."""
     pytest.importorskip("embreex")
     from trimesh.ray.ray_pyembree import RayMeshIntersector
 
@@ -75,7 +75,7 @@ def test_rows_and_types_are_those_of_trimeshs_embree():
         np.testing.assert_array_equal(mine, other)
 
 
-def test_no_hit_is_missing_where_there_are_hundreds_a_hair_apart():
+def test_no_hit_is_missing_among_hundreds_close_together():
     heights = 1 + np.arange(300) * 1e-6
     corners = np.tile([[-1.0, -1, 0], [3, -1, 0], [-1, 3, 0]], (300, 1, 1))
     corners[:, :, 2] = heights[:, None]
@@ -97,7 +97,7 @@ def test_no_hit_is_missing_where_there_are_hundreds_a_hair_apart():
         (1e3, (0, -4e8, 0)),
     ],
 )
-def test_points_in_a_sphere_are_told_from_those_outside(place, size):
+def test_points_inside_a_sphere_are_distinguished_from_points_outside(place, size):
     vertices, faces = sphere(4)
     vertices = vertices.astype(np.float64) * size + place
     _, ours = own(vertices, faces)
@@ -111,8 +111,8 @@ def test_points_in_a_sphere_are_told_from_those_outside(place, size):
     np.testing.assert_array_equal(ours.contains_points(points), inside)
 
 
-def test_points_of_a_grid_are_told_apart_in_a_cube_with_a_cavity():
-    """Origins and directions that meet edges and vertices are what rays' parity is prone to."""
+def test_the_points_of_a_grid_inside_a_cube_with_a_cavity_are_found():
+    """Rays through edges and vertices, at which parity by rays easily goes wrong."""
     outer, inner = trimesh.creation.box((4, 4, 4)), trimesh.creation.box((2, 2, 2))
     inner.invert()
     mesh = trimesh.util.concatenate([outer, inner])
@@ -124,7 +124,7 @@ def test_points_of_a_grid_are_told_apart_in_a_cube_with_a_cavity():
     np.testing.assert_array_equal(mesh.contains(np.zeros((0, 3))), np.zeros(0, bool))
 
 
-def test_what_trimesh_computes_with_rays_works_on_ours():
+def test_trimesh_functions_that_use_rays_work_with_the_adapter():
     mesh, ours = own(*sphere(3))
     mesh.ray = ours
     points, faces = trimesh.sample.sample_surface(mesh, 200, seed=6)
@@ -145,7 +145,7 @@ def test_changes_of_the_mesh_are_followed():
     assert ours.intersects_any(*ray)[0]
 
 
-def test_pickles_and_copies_answer_alike():
+def test_pickles_and_copies_give_the_same_hits():
     mesh, ours = own(*sphere(2))
     mesh.ray = ours
     rays = random_rays(300, seed=4)
@@ -156,14 +156,14 @@ def test_pickles_and_copies_answer_alike():
     np.testing.assert_array_equal(again.ray.intersects_first(*rays), expected)
 
 
-def test_backend_and_accuracy_are_those_asked_for(backend):
+def test_backend_and_accuracy_are_those_requested(backend):
     mesh, _ = own(*sphere(2))
     ours = wive.trimesh.RayMeshIntersector(mesh, backend=backend, accuracy="fast", threads=1)
     assert (ours.scene.backend, ours.scene.accuracy) == (backend, "fast")
     assert (ours.intersects_first(*random_rays(50, seed=5, low=-0.3, high=0.3)) >= 0).all()
 
 
-def test_rays_that_are_none_and_meshes_without_faces_hit_nothing():
+def test_invalid_rays_and_meshes_without_faces_hit_nothing():
     _, ours = own(*sphere(1))
     origins, directions = np.zeros((3, 3)), np.array([[0, 0, 0], [np.nan, 0, 1], [0.1, 0.2, 0.9]])
     np.testing.assert_array_equal(ours.intersects_first(origins, directions) >= 0, [False, False, True])

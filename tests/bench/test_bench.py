@@ -1,4 +1,4 @@
-"""Every bench runs, on a small mesh, and leaves a table, a JSON file and a figure."""
+"""Every bench runs on a small mesh and writes a table, a JSON file and a figure."""
 
 import json
 import os
@@ -16,7 +16,7 @@ from bench.support.report import to_json
 ROOT = Path(__file__).resolve().parents[2]
 RESULTS = ROOT / "bench" / "results"
 SCENE = "terrain_2k"
-# What a machine may lack that only some benches need.
+# Errors of a machine that lacks what only some benches need.
 LACKS = re.compile(r"embreex is not installed|carries no libembree4|no C\+\+ compiler|can't open Embree")
 
 pytest.importorskip("matplotlib", reason="matplotlib draws the benches' figures")
@@ -25,7 +25,7 @@ pytest.importorskip("trimesh")
 
 @pytest.fixture(scope="module")
 def bench(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., dict[str, Any]]:
-    """Runs a bench with --quick; the content of its JSON file. Skips where the machine lacks Embree."""
+    """Runs a bench with --quick; returns the content of its JSON file. Skips if the machine lacks Embree."""
     folder = tmp_path_factory.mktemp("bench")
     environment = {**os.environ, "XDG_CACHE_HOME": str(folder / "cache")}
 
@@ -93,7 +93,9 @@ def test_bench_python_agrees_on_closest_hits(bench: Callable[..., dict[str, Any]
     assert all(row["p50_us"] > 0 for row in content["single"])
 
 
-def test_bench_pareto_finds_no_leak_where_none_is_promised(bench: Callable[..., dict[str, Any]]) -> None:
+def test_bench_pareto_finds_no_leak_in_accuracies_that_promise_none(
+    bench: Callable[..., dict[str, Any]],
+) -> None:
     content = bench("pareto")
     means = {row["contender"]: row for row in content["means"]}
     assert {"fast", "watertight", "compressed", "exact", "float64"} <= means.keys()
@@ -153,7 +155,7 @@ def test_json_has_one_line_per_row_and_loses_nothing() -> None:
 
 
 def quote(*options: str) -> str:
-    """What `python -m bench quote` prints."""
+    """The output of `python -m bench quote`."""
     answer = subprocess.run(
         [sys.executable, "-m", "bench", "quote", *options],
         cwd=ROOT, capture_output=True, text=True, timeout=60, check=False,

@@ -37,7 +37,7 @@ def one_error(capsys) -> str:
     return output.err.removeprefix("wive: error: ").rstrip("\n")
 
 
-def test_render_writes_a_picture_and_tells_rays_per_second(ball, tmp_path, capsys):
+def test_render_writes_a_picture_and_prints_rays_per_second(ball, tmp_path, capsys):
     pillow = pytest.importorskip("PIL.Image")
     picture = tmp_path / "ball.png"
     assert (
@@ -108,7 +108,7 @@ def test_info_describes_mesh_and_tree(ball, capsys):
     assert lines["memory"].endswith("a triangle)")
 
 
-def test_info_tells_how_nodes_are_stored(ball, capsys):
+def test_info_names_the_node_form(ball, capsys):
     sizes = []
     for nodes in ("float32", "compressed"):
         assert run("info", ball, "--nodes", nodes) == 0
@@ -258,7 +258,7 @@ def test_a_failed_picture_leaves_the_old_one(ball, tmp_path, capsys, monkeypatch
     assert sorted(path.name for path in tmp_path.iterdir()) == ["ball.npz", "x.png"]
 
 
-# Python looks for modules where it stands; in the repository that is the source folder, which has no core.
+# Python first looks for modules in the working folder; the repository's source folder has no core.
 ELSEWHERE = tempfile.gettempdir()
 
 
@@ -290,7 +290,7 @@ def test_ctrl_c_ends_a_long_render_with_130_and_no_file(ball, tmp_path):
         "--width",
         400,
         env={**os.environ, "PYTHONUNBUFFERED": "1"},
-        # Whoever runs the tests in the background may have them ignore it.
+        # A shell that runs the tests in the background may have made them ignore the signal.
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )
     try:

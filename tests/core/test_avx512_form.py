@@ -1,4 +1,4 @@
-"""The two forms of the slab test on AVX-512: the same bits, and one of them behind backend "avx512"."""
+"""The two forms of the slab test on AVX-512 give the same bits; backend "avx512" uses one of them."""
 
 import os
 import subprocess
@@ -17,7 +17,7 @@ RUNS = not _cpu.kernels()["avx512"]
 needs_avx512 = pytest.mark.skipif(not RUNS, reason="this machine has no AVX-512")
 
 VARIABLE = "WIVE_AVX512_FORM"
-# Prints the form, then a digest of every query's answers on backend avx512, of either form of nodes.
+# Prints the form, then a digest of every query's results on backend avx512, with both forms of nodes.
 ANSWERS = """
 import hashlib, itertools, numpy, wive
 from wive import _cpu
@@ -72,7 +72,7 @@ def test_both_forms_give_the_same_bits_to_every_query(
 
 
 @needs_avx512
-def test_the_backend_uses_the_form_asked_for_with_the_same_answers() -> None:
+def test_the_backend_uses_the_requested_form_with_the_same_results() -> None:
     answers = {form: run(ANSWERS, form) for form in ("full", "half", "race")}
     for form, answer in answers.items():
         assert answer.returncode == 0, answer.stderr
@@ -81,7 +81,7 @@ def test_the_backend_uses_the_form_asked_for_with_the_same_answers() -> None:
 
 
 @needs_avx512
-def test_an_unknown_form_is_told_by_the_first_query_that_needs_one() -> None:
+def test_an_unknown_form_is_named_by_the_first_query_that_needs_one() -> None:
     program = f"""
 import numpy, wive
 mesh = numpy.float32({TRIANGLE[0].tolist()}), numpy.int32({TRIANGLE[1].tolist()})
@@ -100,7 +100,7 @@ for _ in range(2):
     assert answer.stdout.splitlines() == ["0", "0", line, line]
 
 
-def test_only_avx512_has_a_form_and_only_where_it_runs() -> None:
+def test_only_a_usable_avx512_backend_has_a_form() -> None:
     forms = {name: backend.form for name, backend in wive.backends().items()}
     assert forms.pop("avx512") in (("full", "half") if RUNS else ("",))
     assert set(forms.values()) == {""}

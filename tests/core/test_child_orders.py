@@ -28,7 +28,7 @@ def eight_clusters() -> tuple[np.ndarray, np.ndarray]:
     return vertices.astype(np.float32), np.arange(120, dtype=np.int32).reshape(-1, 3)
 
 
-def test_places_of_children_in_the_corners_are_those_corners() -> None:
+def test_children_in_the_corners_get_the_slots_of_those_corners() -> None:
     root = _cpu.Bvh(*eight_clusters(), order="slots").nodes[0]
     centres = root[:6].view(np.float32).reshape(3, 2, 8).sum(axis=1)
     places = (centres > centres.mean(axis=1, keepdims=True)).T @ [1, 2, 4]

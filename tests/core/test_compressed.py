@@ -56,7 +56,7 @@ def rays_at(mesh: Mesh, count: int, seed: int) -> Mesh:
     low, high = vertices.min(axis=0).astype(np.float64), vertices.max(axis=0).astype(np.float64)
     reach = np.array([0.5, 1.5, 1000.0])[np.arange(count) % 3, None]
     origins = (low + high) / 2 + reach * (high - low).max() * random.uniform(-1, 1, (count, 3))
-    origins[::7, 2] = aims[::7, 2]  # a zero component here and there
+    origins[::7, 2] = aims[::7, 2]  # some components are zero
     origins = np.clip(origins, -1e18, 1e18).astype(np.float32)
     return origins, (aims - origins).astype(np.float32)
 
@@ -64,7 +64,7 @@ def rays_at(mesh: Mesh, count: int, seed: int) -> Mesh:
 def assert_same_answers(
     one: _cpu.Bvh, other: _cpu.Bvh, kernel: str, rays: Mesh, in_flight: int, asked: np.ndarray | None = None
 ) -> None:
-    """Both queries give the same bits, for all rays or those asked for."""
+    """Both queries give the same bits, for all rays or for the selected ones."""
     queries = [(bvh, (kernel, *rays, ZERO, INFINITE, 2, in_flight)) for bvh in (one, other)]
     (t, prim, uv, _), (other_t, other_prim, other_uv, _) = (bvh.intersect(*query) for bvh, query in queries)
     occluded, other_occluded = (bvh.occluded(*query)[0] for bvh, query in queries)
@@ -78,8 +78,8 @@ def assert_same_answers(
 def seen_edge_on(mesh: Mesh, bvhs: list[_cpu.Bvh], kernel: str, rays: Mesh) -> np.ndarray:
     """Whether a ray hits a triangle at less than six degrees to its plane.
 
-    There the t of "fast" is so far off that it may lie outside the triangle's box, and what is found depends
-    on the order in which boxes are opened.
+    The t of "fast" is then so far off that it may lie outside the triangle's box, and the result depends on
+    the order in which boxes are visited.
     """
     found = np.zeros(len(rays[0]), bool)
     for bvh in bvhs:
@@ -99,7 +99,7 @@ def seen_edge_on(mesh: Mesh, bvhs: list[_cpu.Bvh], kernel: str, rays: Mesh) -> n
 @pytest.mark.parametrize("accuracy", ACCURACIES)
 def test_hits_on_hard_meshes_are_those_of_float32_nodes(mesh: Mesh, accuracy: str, kernel: str) -> None:
     bvhs = both(mesh, accuracy)
-    # Where hits coincide, exact trees compare them all in integers: that takes long.
+    # Exact trees compare coincident hits in integers, which takes long.
     rays = rays_at(mesh, 300 if accuracy == "exact" else 3000, 1)
     asked = ~seen_edge_on(mesh, bvhs, kernel, rays) if accuracy == "fast" else None
     assert asked is None or asked.mean() > 0.5
@@ -132,7 +132,7 @@ def test_a_real_scene_takes_forty_bytes_a_triangle_at_most(name: str, scenes: Ca
     assert bvh.nodes[0].nbytes <= 128
 
 
-def test_every_box_holds_all_that_is_below_it_in_exact_arithmetic(mesh: Mesh) -> None:
+def test_every_box_holds_its_subtree_in_exact_arithmetic(mesh: Mesh) -> None:
     bvh = _cpu.Bvh(*mesh, nodes="compressed")
     ways = list(walk(bvh))
     lowest, highest = np.full((len(bvh.nodes), 3), np.inf), np.full((len(bvh.nodes), 3), -np.inf)
@@ -194,7 +194,7 @@ def test_order_is_that_of_the_float32_node() -> None:
     "name", ["one triangle", "a flat triangle", "sphere", "soup", "tiny", "tinier", "strewn"]
 )
 def test_empty_lanes_are_never_hit_however_far_the_ray_starts(name: str, kernel: str) -> None:
-    # From far away the slack is larger than a node, and no box in it is inverted enough not to be met.
+    # From far away the slack is larger than a node, and even inverted boxes in it are hit.
     mesh = MESHES[name]()
     plain, bvh = both(mesh, "watertight")
     assert (children(bvh) == NO_CHILD).any()
@@ -237,7 +237,7 @@ def test_the_tree_does_not_depend_on_threads(accuracy: str) -> None:
 
 
 def test_a_leaf_of_many_triangles_without_shared_vertices_is_whole() -> None:
-    # Boxes that all have the same centre: no split pays, so leaves are as large as they may be.
+    # Boxes with one common centre: no split lowers the cost, so leaves have their largest size.
     random = np.random.default_rng(11)
     one = random.uniform(0.999, 1.0, (400, 3)) * random.choice([-1, 1], (400, 3))
     corners = np.stack([one, -one, one * random.uniform(-1, 1, (400, 3))], axis=1).astype(np.float32)
@@ -246,7 +246,7 @@ def test_a_leaf_of_many_triangles_without_shared_vertices_is_whole() -> None:
     assert max(reference & 7 for _, _, reference in walk(bvh) if reference >= LEAF) == 7
 
 
-def test_a_kernel_says_what_it_was_not_made_for() -> None:
+def test_a_kernel_names_the_options_it_was_not_compiled_for() -> None:
     compressed, fast = _cpu.Bvh(*TRIANGLE, nodes="compressed"), _cpu.Bvh(*TRIANGLE, "fast")
     rays = *random_rays(1, 1), ZERO, INFINITE
     begin = "^kernel 'scalar.distance' was not made for query "

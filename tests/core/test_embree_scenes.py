@@ -14,19 +14,19 @@ rtcore_scene = pytest.importorskip("embreex.rtcore_scene", reason="embreex is no
 mesh_construction = pytest.importorskip("embreex.mesh_construction")
 
 SEED = 20170728
-PICTURE = 160  # pixels a side: 25,600 primary rays
-PATHS = 64  # pixels a side: 4,096 paths of up to eight bounces
+PICTURE = 160  # pixels per side: 25,600 primary rays
+PATHS = 64  # pixels per side: 4,096 paths of up to eight bounces
 BOUNCES = 8
-SPAWN_OFFSET = 1e-5  # of the bounding box's diagonal
+SPAWN_OFFSET = 1e-5  # in diagonals of the bounding box
 FAR = 1e37  # embreex's tmax
 
 CAMERAS = json.loads((SCENES / "cameras.json").read_text()) if (SCENES / "cameras.json").exists() else {}
-TERRAIN = "matplotlib's terrain"  # stands in where there are no scenes
+TERRAIN = "matplotlib's terrain"  # used if there are no scenes
 
 
 @dataclass(frozen=True)
 class Case:
-    """A scene's mesh, its rays, and what embreex answers with and without its robust flag."""
+    """A scene's mesh, its rays, and embreex's results with and without its robust flag."""
 
     name: str
     mesh: tuple[np.ndarray, np.ndarray]
@@ -84,7 +84,7 @@ def test_wrong_answers_are_not_explained(case: Case) -> None:
     }
     for name, answers in wrong.items():
         label = explain(case.origins, case.directions, case.mesh, answers, right, fast=False)[hit]
-        # Rays that meet edges or graze may be answered so; no more than one in a hundred of them does.
+        # Rays at edges and grazing rays may have such results; at most one in a hundred does.
         assert np.count_nonzero(label == "unexplained") > 0.99 * len(label), name
 
 

@@ -1,4 +1,4 @@
-"""float64 trees of the core: what they answer, on every kernel and node form, where float32 can't."""
+"""float64 trees of the core, on every kernel and node form: results that float32 can't give."""
 
 import itertools
 from fractions import Fraction
@@ -97,16 +97,14 @@ def test_hits_are_those_of_rational_arithmetic(place: tuple[float, ...]) -> None
             assert prim[ray] == (exact[ray][0][1] if exact[ray] else -1)
             assert t[ray] == (every_t[offsets[ray]] if exact[ray] else np.inf)
             for measured, (true, _, _) in zip(every_t[rows], exact[ray], strict=True):
-                # 64 units in the last place: the triangles are no worse seen than that.
+                # 64 units in the last place, the largest error from these directions
                 assert abs(Fraction(measured) - true) <= 64 * Fraction(2) ** -53 * max(true, 1)
 
 
 @each_kernel
 @each_form
 @pytest.mark.parametrize("place", [0.0, 1000.0, -3e6])
-def test_where_all_numbers_are_float32_float64_answers_the_same_but_finer(
-    kernel: str, nodes: str, place: float
-) -> None:
+def test_float64_refines_the_hits_of_float32_numbers(kernel: str, nodes: str, place: float) -> None:
     random = np.random.default_rng(5)
     vertices, faces = sphere(5)
     vertices = (vertices * 100 + place).astype(np.float32)
@@ -118,9 +116,7 @@ def test_where_all_numbers_are_float32_float64_answers_the_same_but_finer(
         _cpu.Bvh(vertices.astype(dtype), faces, nodes=nodes) for dtype in (np.float32, np.float64)
     )
     assert np.array_equal(narrow.center, wide.center) and np.array_equal(narrow.bounds, wide.bounds)
-    if (
-        place == 0.0 and nodes == "float32"
-    ):  # the same boxes; where they stand is decided by areas, which are rounded
+    if place == 0.0 and nodes == "float32":  # the same boxes; their order depends on areas, which are rounded
         boxes = [sorted(tree.nodes[:, :6].swapaxes(1, 2).reshape(-1, 6).tolist()) for tree in (narrow, wide)]
         assert boxes[0] == boxes[1]
     t32, prim32, _ = closest(narrow, kernel, origins, directions)
@@ -174,7 +170,7 @@ def test_a_triangle_has_an_area_where_exact_arithmetic_finds_one() -> None:
     face = np.int32([[0, 1, 2]])
     assert np.isinf(_cpu.Bvh(line, face).bounds).all()
     assert np.array_equal(_cpu.Bvh(bent, face).bounds, [[0, 0, 0], bent[2]])
-    far = line * np.float64(7) + 0.1  # rounding bends it, and only rationals can tell by how much
+    far = line * np.float64(7) + 0.1  # rounding makes it uneven, by an amount that only rationals give
     exact = [[Fraction(x) for x in v] for v in far]
     sides = [[b - a for a, b in zip(exact[0], exact[k], strict=True)] for k in (1, 2)]
     area = any(sides[0][i - 2] * sides[1][i - 1] != sides[0][i - 1] * sides[1][i - 2] for i in range(3))
@@ -233,7 +229,7 @@ def test_points_and_normals_of_hits_are_those_of_the_double_corners() -> None:
     assert (np.sum(normals[1:] * outwards, axis=1) > 0.99).all()
 
 
-def test_what_float64_trees_do_not_take_is_told_in_one_line() -> None:
+def test_arguments_that_float64_trees_do_not_take_are_refused_in_one_line() -> None:
     vertices, faces = sphere64(1)
     with pytest.raises(ValueError, match=r"accuracy: 'exact' takes vertices in float32"):
         _cpu.Bvh(vertices, faces, "exact")

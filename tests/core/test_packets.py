@@ -1,4 +1,4 @@
-"""Rays that go together, in a picture, a scan or a fan, find what each of them finds alone."""
+"""Coherent rays, of a picture, a scan or a fan, find in packets the hits that each finds alone."""
 
 from collections.abc import Callable
 from functools import partial
@@ -14,7 +14,7 @@ from support.meshes import soup, sphere
 from wive import _cpu
 
 KERNELS = [name for name, reason in _cpu.kernels().items() if not reason]
-TOGETHER = 16  # the rays of a packet (packet.h), and the fewest in flight with which there are packets
+TOGETHER = 16  # rays per packet (packet.h), and the fewest rays in flight for which packets are formed
 
 
 class Batch(NamedTuple):
@@ -61,7 +61,7 @@ def scan(mesh: tuple[np.ndarray, np.ndarray], direction: tuple[float, float, flo
 
 
 def with_bad_rays(rays: Batch) -> Batch:
-    """Here and there a ray that hits nothing by rule."""
+    """The batch with some rays that miss by rule."""
     origins, directions = rays.origins.copy(), rays.directions.copy()
     origins[5::301, 1] = np.nan
     directions[111::407] = 0
@@ -70,7 +70,7 @@ def with_bad_rays(rays: Batch) -> Batch:
 
 
 def at_edges(scale: float, place: tuple[float, float, float]) -> Batch:
-    """From the middle of a closed sphere at its vertices and at points of its edges, neighbours together."""
+    """Rays from the middle of a closed sphere at its vertices and points of its edges, in coherent order."""
     mesh = placed(sphere(4), scale, place)
     origins, directions = leaving(mesh, 200_000, np.random.default_rng(7), spread=0.0)
     patch = np.flatnonzero((directions[:, 0] == abs(directions).max(axis=1)) & (directions > 0).all(axis=1))
@@ -79,7 +79,7 @@ def at_edges(scale: float, place: tuple[float, float, float]) -> Batch:
 
 
 def sixteen_of_each(name: str, count: int) -> Batch:
-    """The rays of a hard set, each of them a packet."""
+    """The rays of a hard set, each repeated to fill a packet."""
     vertices, faces, origins, directions = hard_set(name)
     chosen = np.repeat(np.linspace(0, len(origins) - 1, count).astype(int), TOGETHER)
     return batch((vertices, faces), origins[chosen], directions[chosen])
@@ -99,8 +99,8 @@ BATCHES: dict[str, Callable[[], Batch]] = {
 }
 
 
-def share_that_goes_together(rays: Batch, bvh: _cpu.Bvh) -> float:
-    """Of the packets from the first ray on, those that cpu/traverse/packet.h does not refuse."""
+def share_of_packets(rays: Batch, bvh: _cpu.Bvh) -> float:
+    """The share of packets, from the first ray on, that cpu/traverse/packet.h accepts."""
     n = len(rays.origins) // TOGETHER * TOGETHER
     arrays = rays.origins, rays.directions
     origins, directions = (a[:n].astype(np.float64).reshape(-1, TOGETHER, 3) for a in arrays)
@@ -112,7 +112,7 @@ def share_that_goes_together(rays: Batch, bvh: _cpu.Bvh) -> float:
 
 
 def answers(bvh: _cpu.Bvh, kernel: str, rays: Batch, threads: int, in_flight: int) -> list[bytes]:
-    """What every query says, as bits; the comparisons' kernels know closest hits alone."""
+    """The results of every query, as bits; kernels for comparisons have closest hits alone."""
     arguments = kernel, *rays[2:], threads, in_flight
     found = list(bvh.intersect(*arguments)[:3])
     if not kernel.endswith("distance"):
@@ -132,7 +132,7 @@ def test_hits_are_those_of_each_ray_alone(kernel: str, name: str) -> None:
         forms += [("compressed", "watertight"), ("compressed", "fast")]
     for nodes, accuracy in forms:
         bvh = _cpu.Bvh(rays.vertices, rays.faces, accuracy, nodes=nodes)
-        assert share_that_goes_together(rays, bvh) > 0.5
+        assert share_of_packets(rays, bvh) > 0.5
         alone = answers(bvh, kernel, rays, 1, 1)
         for threads, in_flight in ((1, TOGETHER), (2, 0)):
             assert answers(bvh, kernel, rays, threads, in_flight) == alone, (nodes, accuracy, in_flight)

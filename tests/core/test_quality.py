@@ -1,4 +1,4 @@
-"""quality="high": a better tree over the same triangles, never other hits."""
+"""quality="high" makes a better tree over the same triangles, and gives the same hits."""
 
 from collections.abc import Callable
 from pathlib import Path

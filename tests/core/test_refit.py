@@ -1,4 +1,4 @@
-"""Refitting: the hits of a scene made anew, from the tree there is."""
+"""A refitted scene gives the hits of a new scene."""
 
 import pickle
 import threading
@@ -26,7 +26,7 @@ def bent(vertices: np.ndarray, by: float = 0.3) -> np.ndarray:
 
 
 def shuffled(vertices: np.ndarray) -> np.ndarray:
-    """The vertices in another order: the old tree suits it as badly as can be."""
+    """The vertices in another order, for which the old tree is as bad as possible."""
     return np.random.default_rng(1).permutation(vertices)
 
 
@@ -47,7 +47,7 @@ def moved(request: pytest.FixtureRequest) -> np.ndarray:
 
 
 def rays_for(vertices: np.ndarray, count: int = 3000) -> tuple[np.ndarray, np.ndarray]:
-    """From round the mesh towards points of it."""
+    """Rays from around the mesh towards points of it."""
     origins, _ = random_rays(count, seed=2)
     lowest, highest = vertices.min(axis=0), vertices.max(axis=0)
     middle, size = (lowest + highest) / 2, (highest - lowest).max()

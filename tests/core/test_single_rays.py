@@ -1,4 +1,4 @@
-"""A ray that is traced alone finds what it finds among others, whatever rays were traced before it."""
+"""A ray traced alone gives the hits that it gives in a batch, whatever rays were traced before."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Results that depend on nothing but the rays, from threads and from forked processes."""
+"""Results depend on the rays alone, in threads and in forked processes."""
 
 import multiprocessing
 import threading
@@ -78,7 +78,7 @@ def test_a_forked_child_traces_as_its_parent_did(scene):
 
     child = context.Process(target=trace_and_build)
     with warnings.catch_warnings():
-        # Python warns of any fork while other threads live, whoever started them.
+        # Python warns of any fork while other threads run.
         warnings.simplefilter("ignore", DeprecationWarning)
         child.start()
     try:

@@ -30,9 +30,7 @@ def bvh(request: pytest.FixtureRequest, mesh: tuple[np.ndarray, np.ndarray]) -> 
     return _cpu.Bvh(*mesh, quality=request.param)
 
 
-def test_every_triangle_stands_in_exactly_one_leaf(
-    mesh: tuple[np.ndarray, np.ndarray], bvh: _cpu.Bvh
-) -> None:
+def test_every_triangle_is_in_exactly_one_leaf(mesh: tuple[np.ndarray, np.ndarray], bvh: _cpu.Bvh) -> None:
     blocks = [block for *_, child in walk(bvh) if child >= LEAF for block in leaf_blocks(bvh, child)]
     assert sorted(blocks) == list(range(len(bvh.blocks)))
     prims = bvh.blocks[:, 9].view(np.int32).ravel()
@@ -76,7 +74,7 @@ def test_order_is_a_permutation_and_the_opposite_octant_reverses_it(bvh: _cpu.Bv
 
 
 def test_order_follows_the_split_axes() -> None:
-    # A row of separate triangles along x: a ray along +x meets them by rising x, one along -x by falling x.
+    # A row of separate triangles along x: a ray along +x hits them by rising x, a ray along -x by falling x.
     vertices = np.concatenate([MESHES["one triangle"][0] + np.float32([10 * i, 0, 0]) for i in range(64)])
     bvh = _cpu.Bvh(vertices, np.arange(192, dtype=np.int32).reshape(-1, 3))
     low, _ = planes(bvh)
@@ -87,12 +85,12 @@ def test_order_follows_the_split_axes() -> None:
 
 
 @pytest.mark.parametrize("quality", ["medium", "high"])
-def test_children_stand_in_order_of_how_much_they_cover_for_their_size(quality: str) -> None:
+def test_children_are_sorted_by_the_area_they_cover_per_size(quality: str) -> None:
     vertices, faces = soup(3000, seed=2)
     bvh = _cpu.Bvh(vertices, faces, quality=quality)
     low, high = planes(bvh)
     edges = vertices[faces[:, 1:]].astype(np.float64) - vertices[faces[:, :1]]
-    areas = np.abs(np.cross(edges[:, 0], edges[:, 1])).sum(axis=1)  # twice the projections
+    areas = np.abs(np.cross(edges[:, 0], edges[:, 1])).sum(axis=1)  # twice the projected areas
     ways = walk(bvh)
 
     def prims(child: int) -> list[int]:
@@ -124,7 +122,9 @@ def test_zero_area_triangles_are_left_out_and_keep_their_numbers() -> None:
 @pytest.mark.parametrize("quality", ["medium", "high"])
 @pytest.mark.parametrize("accuracy", ["fast", "watertight"])
 def test_the_tree_does_not_depend_on_threads(accuracy: str, quality: str) -> None:
-    vertices, faces = soup(300_000, seed=4, size=0.01)  # enough for ranges that all threads split together
+    vertices, faces = soup(
+        300_000, seed=4, size=0.01
+    )  # enough triangles for ranges that all threads split together
     one, many = (_cpu.Bvh(vertices, faces, accuracy, threads=threads, quality=quality) for threads in (1, 5))
     assert np.array_equal(one.units, many.units)
 

@@ -15,7 +15,7 @@ DIRECTIONS = np.array(
 
 
 def grid(size: int) -> tuple[np.ndarray, np.ndarray]:
-    """A closed box [0, size]^3 whose six sides are integer grids of two triangles a cell."""
+    """A closed box [0, size]^3 whose six sides are integer grids of two triangles per cell."""
     corners: dict[tuple[int, int, int], int] = {}
     faces: list[list[int]] = []
 
@@ -65,7 +65,7 @@ def leaving(mesh: Mesh, count: int, random: np.random.Generator, spread: float =
 
 
 def utm_terrain(size: int = 40, cell: float = 10.0) -> Mesh:
-    """Hills over a square grid of metres in UTM zone coordinates, where float32 knows half metres only."""
+    """Hills over a square grid of metres in UTM zone coordinates, where float32 resolves half metres."""
     random = np.random.default_rng(41)
     across, up = np.meshgrid(np.arange(size + 1), np.arange(size + 1), indexing="ij")
     heights = 300 + 40 * np.sin(across / 5) * np.cos(up / 7) + random.random(across.shape)
@@ -77,11 +77,11 @@ def utm_terrain(size: int = 40, cell: float = 10.0) -> Mesh:
 
 
 def nearness(mesh: Mesh, origins: np.ndarray, directions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Each line against each triangle, as seen along the ray, in double: a distance (n,f) and t (n,f).
+    """Distance (n,f) and t (n,f) of each line and each triangle, projected along the ray, in double.
 
-    The distance is from the ray to the triangle's border, negative outside, in units of what rounding may
-    move a corner by in the watertight test (docs/accuracy.md): above 1 the ray is inside for certain, below
-    -1 outside.
+    The distance is from the ray to the triangle's border, negative outside, in units of the distance
+    by which rounding may move a corner in the watertight test (docs/accuracy.md): above 1 the ray is
+    certainly inside, below -1 certainly outside.
     """
     axis = np.argmax(np.abs(directions), axis=1)
     order = (axis[:, None] + [1, 2, 3]) % 3
@@ -103,8 +103,8 @@ def nearness(mesh: Mesh, origins: np.ndarray, directions: np.ndarray) -> tuple[n
     weight = np.stack(weights)
     total = weight.sum(axis=0)
     inside = (weight * np.sign(total) >= 0).all(axis=0) & (total != 0)
-    reach = np.max([np.abs(p).max(axis=-1) for p in corners], axis=0)
-    moved = 2**0.5 * 6 * 2.0**-24 * reach
+    magnitude = np.max([np.abs(p).max(axis=-1) for p in corners], axis=0)
+    moved = 2**0.5 * 6 * 2.0**-24 * magnitude
     with np.errstate(all="ignore"):
         t = (weight * depth).sum(axis=0) / total / ray[..., 2]
     return np.where(inside, 1, -1) * np.min(borders, axis=0) / moved, t

@@ -1,4 +1,4 @@
-"""Compressed trees read word by word, as cpu/core/compressed.h describes them, and meshes hard for them."""
+"""Compressed trees read word by word, as cpu/core/compressed.h describes them, and hard meshes for them."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -29,7 +29,7 @@ class Block:
 def decode_planes(bvh: _cpu.Bvh) -> tuple[np.ndarray, np.ndarray]:
     """Lower and upper corners of every lane's box (m,8,3), relative to the centre.
 
-    Exact in float64 wherever origin and step are within 2**20 of each other.
+    Exact in float64 if origin and step are within 2**20 of each other.
     """
     words = np.ascontiguousarray(bvh.nodes).reshape(len(bvh.nodes), NODE_WORDS)
     header = words[:, :6].view(np.float32).astype(np.float64)
@@ -57,14 +57,14 @@ def children(bvh: _cpu.Bvh) -> np.ndarray:
 
 
 def orders(bvh: _cpu.Bvh) -> np.ndarray:
-    """(m,8) order lanes, three bits an octant."""
+    """(m,8) order lanes, three bits per octant."""
     words = np.ascontiguousarray(bvh.nodes).reshape(len(bvh.nodes), NODE_WORDS)
     lanes = np.ascontiguousarray(words[:, 18:24]).view(np.uint8).reshape(-1, 8, 3).astype(np.uint32)
     return lanes[..., 0] | lanes[..., 1] << np.uint32(8) | lanes[..., 2] << np.uint32(16)
 
 
 def walk(bvh: _cpu.Bvh) -> Iterator[tuple[int, int, int]]:
-    """Every way down: (node, lane, child reference)."""
+    """Every used lane: (node, lane, child reference)."""
     child = children(bvh)
     todo = [0]
     while todo:
@@ -93,7 +93,7 @@ def blocks(bvh: _cpu.Bvh, reference: int) -> Iterator[Block]:
 
 
 def all_prims(bvh: _cpu.Bvh) -> list[int]:
-    """The numbers in all leaves, sorted."""
+    """The triangle numbers in all leaves, sorted."""
     leaves = [reference for _, _, reference in walk(bvh) if reference >= LEAF]
     return sorted(prim for leaf in leaves for block in blocks(bvh, leaf) for prim in block.prims)
 

@@ -1,4 +1,4 @@
-"""Hits that are easy and hits that are not, and the exact t of each, for tests of `Hits.error_bound`."""
+"""Easy and hard hits, and the exact t of each, for tests of `Hits.error_bound`."""
 
 from collections.abc import Callable
 from fractions import Fraction
@@ -80,7 +80,7 @@ def directions_of_all_lengths(dtype: type = np.float32) -> Set:
 
 
 def edges_and_vertices(dtype: type = np.float32) -> Set:
-    """Aimed where only rounded corners let many rays in: what a watertight hit is then of."""
+    """Rays at edges and vertices, many of which only hit triangles whose corners are rounded."""
     random = np.random.default_rng(8)
     vertices, faces = sphere(4, radius=1000.0)
     vertices = (vertices + np.array([148376.0, 1234.0, -223423.0])).astype(dtype)
@@ -122,7 +122,7 @@ def crossed(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def exact_t(hits: wive.Hits, origins: np.ndarray, directions: np.ndarray) -> np.ndarray:
-    """Where each line meets the plane of the triangle hit; None where it runs in it."""
+    """t at which each line meets the plane of the triangle hit; None if the line is in the plane."""
     v0, v1, v2 = fractions(hits.vertices[hits.faces[hits.prim[hits.mask]]]).swapaxes(0, 1)
     normal = crossed(v1 - v0, v2 - v0)
     height = (normal * (v0 - fractions(origins[hits.mask]))).sum(axis=1)
@@ -131,7 +131,7 @@ def exact_t(hits: wive.Hits, origins: np.ndarray, directions: np.ndarray) -> np.
 
 
 def broken(hits: wive.Hits, exact: np.ndarray, bounds: np.ndarray) -> int:
-    """How many hits are farther from the exact t than their bound (n,) says."""
+    """The number of hits whose t is farther from the exact t than their bound (n,)."""
     count = 0
     for t, truth, bound in zip(hits.t[hits.mask], exact, bounds[hits.mask], strict=True):
         assert not np.isnan(bound)

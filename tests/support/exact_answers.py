@@ -1,4 +1,4 @@
-"""What exact arithmetic answers on the hard sets, and the rays whose answers differ from it."""
+"""Exact arithmetic's results on the hard sets, and the rays whose results differ from them."""
 
 import functools
 
@@ -16,7 +16,7 @@ def truth_of(name: str) -> Truth:
 
 
 def wrong_rays(found: Truth, right: Truth) -> np.ndarray:
-    """The rays whose answers are not the right bits; a NaN is as good as another."""
+    """The rays whose results are not the right bits; any NaN equals any other."""
     uv = (found.uv.view(np.uint32) == right.uv.view(np.uint32)) | (np.isnan(found.uv) & np.isnan(right.uv))
     same = (found.t.view(np.uint32) == right.t.view(np.uint32)) & (found.prim == right.prim) & uv.all(axis=1)
     return np.flatnonzero(~(same & (found.occluded == right.occluded)))

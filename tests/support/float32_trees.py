@@ -19,7 +19,7 @@ def used_lanes(bvh: _cpu.Bvh) -> np.ndarray:
 
 
 def walk(bvh: _cpu.Bvh) -> list[tuple[int, int, int, int]]:
-    """Every way down: (node, lane, depth, child reference)."""
+    """Every used lane: (node, lane, depth, child reference)."""
     lanes, todo, found = used_lanes(bvh), [(0, 1)], []
     while todo:
         node, depth = todo.pop()

@@ -20,7 +20,7 @@ PLACES = [(0.0, 0.0, 0.0), UTM, (-3e9, 2e9, 1e9), (1e15, 0.0, -1e15)]
 
 
 def kernels() -> list[str]:
-    """Those of float64 trees that this machine can run."""
+    """The kernels of float64 trees that this machine can run."""
     usable = _cpu.kernels()
     return [name for name in ("avx512", "avx2", "scalar") if not usable[name]]
 
@@ -83,7 +83,7 @@ def closest(
 
 
 def hits_it(bvh: _cpu.Bvh, kernel: str, origins: np.ndarray, directions: np.ndarray) -> np.ndarray:
-    """Whether the closest-hit and the any-hit query find something; they must agree."""
+    """Whether the closest-hit and the any-hit query hit; both must agree."""
     found = closest(bvh, kernel, origins, directions)[1] >= 0
     assert np.array_equal(found, query(bvh, kernel, "occluded", origins, directions)[0])
     return found
@@ -100,7 +100,7 @@ def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def exact_hits(mesh: Mesh, origin: np.ndarray, direction: np.ndarray) -> list[tuple[Fraction, int, Fraction]]:
-    """Of each triangle that the exact line meets: t, number, and the least of its three weights of sum 1."""
+    """t, number and least of the three normalised weights, of each triangle that the exact line meets."""
     corners = fractions(mesh[0])[mesh[1]]
     o, d = fractions(origin), fractions(direction)
     away = corners - o

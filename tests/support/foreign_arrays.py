@@ -1,4 +1,4 @@
-"""Arrays of a library that nobody knows by name."""
+"""Arrays of a library that wive does not know by name."""
 
 import numpy as np
 
@@ -9,7 +9,7 @@ class Foreign:
     __name__ = "foreign.api"
 
     class Array:
-        """One of its arrays; `place` is what it says of its device."""
+        """One of its arrays; `place` is its DLPack device."""
 
         def __init__(self, values, place=(1, 0)):
             self.values, self.place = np.asarray(values), place

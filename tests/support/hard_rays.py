@@ -1,4 +1,4 @@
-"""Meshes and rays on which float arithmetic has to decide."""
+"""Meshes and rays whose hits depend on rounding."""
 
 import numpy as np
 
@@ -8,9 +8,9 @@ Mesh = tuple[np.ndarray, np.ndarray]
 
 
 def hard_rays(vertices: np.ndarray, faces: np.ndarray) -> Mesh:
-    """Rays at vertices, edges and face centres from inside and outside, axis rays, rays that are none.
+    """Rays at vertices, edges and face centres from inside and outside, axis rays, invalid rays.
 
-    They are of the vertices' dtype.
+    They have the vertices' dtype.
     """
     center = (vertices.min(axis=0).astype(np.float64) + vertices.max(axis=0)) / 2
     corners = vertices[faces].astype(np.float64)

@@ -61,7 +61,7 @@ def aimed(vertices: np.ndarray, faces: np.ndarray, seed: int, count: int, distan
 
 
 def slivers() -> HardSet:
-    """Triangles whose third corner lies on the opposite side but for rounding."""
+    """Triangles whose third corner is a rounded point of the opposite side."""
     random = np.random.default_rng(22)
     a, b = random.random((2, 60, 3))
     c = a + random.random((60, 1)) * (b - a)
@@ -70,7 +70,7 @@ def slivers() -> HardSet:
 
 
 def coincident_faces() -> HardSet:
-    """The same triangles of one plane several times, in all orders of their corners."""
+    """Triangles of one plane, each several times with its corners in another order."""
     random = np.random.default_rng(24)
     flat = random.integers(-4, 5, (12, 2))
     vertices = np.stack([*flat.T, flat[:, 0] + 2 * flat[:, 1]], axis=1).astype(np.float32) / 8
@@ -81,7 +81,7 @@ def coincident_faces() -> HardSet:
 
 
 def thin_walls() -> HardSet:
-    """Walls 1e-5 to 2e-7 apart, the far ones with the lower numbers, crossing each other here and there."""
+    """Walls 1e-5 to 2e-7 apart, the far ones with the lower numbers, some of which cross."""
     random = np.random.default_rng(25)
     square = np.array([[-1, -1, 1], [1, -1, 1], [0, 1, 1]])
     walls = [square + np.array([0, 0, gap]) for gap in (1e-5, 1e-6, 3e-7, 2e-7, 0)]
@@ -112,7 +112,7 @@ def moved_sphere(scale: float, place: tuple[float, float, float] = (0, 0, 0)) ->
 
 
 def far_origins() -> HardSet:
-    """Rays from up to 1e7 sizes away, where the float filter can tell least."""
+    """Rays from up to 1e7 sizes away, where the float filter decides least."""
     random = np.random.default_rng(28)
     vertices, faces = sphere(1)
     rays = aimed(vertices, faces, 29, 900, 1.0)

@@ -1,4 +1,4 @@
-"""Small meshes, rays for them, a brute-force oracle, and what it means for hits to be the same."""
+"""Small meshes, rays for them, a brute-force oracle, and a comparison of hits."""
 
 import numpy as np
 
@@ -57,9 +57,9 @@ def random_rays(
 def all_crossings(
     vertices: np.ndarray, faces: np.ndarray, origins: np.ndarray, directions: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Every ray against every triangle in float64: t (n,f), inf where they miss, and how clear that is.
+    """Every ray against every triangle in float64: t (n,f), inf on a miss, and clearness (n,f).
 
-    Clearness (n,f) is the least distance, in barycentrics, to where hit turns into miss.
+    Clearness is the least distance, in barycentrics, to the border between hit and miss.
     """
     v0, v1, v2 = vertices[faces].astype(np.float64).swapaxes(0, 1)
     edge1, edge2 = v1 - v0, v2 - v0

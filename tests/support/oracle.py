@@ -16,7 +16,7 @@ OVERFLOW = LARGEST + Fraction(2) ** 103  # half a unit in the last place above: 
 
 @dataclass(frozen=True)
 class Truth:
-    """What the queries must return, to the bit."""
+    """The right results of the queries, to the bit."""
 
     t: np.ndarray
     prim: np.ndarray
@@ -47,7 +47,7 @@ def meetings(
 ) -> Meetings:
     """All lines against all triangles. `moved`: the origins are moved by (e, e^2, e^3), e = 2^-60.
 
-    Where coordinates are multiples of 1/4 and below 32, that changes no sign that is not zero.
+    If coordinates are multiples of 1/4 and below 32, the move changes no sign but that of zero.
     """
     unit, direction_unit = unit_of(vertices, origins), unit_of(directions)
     o = integers(origins, unit)[:, None]
@@ -99,7 +99,7 @@ def truth(
 def crossings(
     vertices: np.ndarray, faces: np.ndarray, origins: np.ndarray, directions: np.ndarray
 ) -> np.ndarray:
-    """(n,) how many triangles each ray from t = 0 on passes, by moving the origins."""
+    """(n,) number of triangles that each ray from t = 0 on crosses, by moving the origins."""
     met = meetings(vertices, faces, origins, directions)
     passed = meetings(vertices, faces, origins, directions, moved=True).inside
     ahead = met.height * np.where(met.determinant < 0, -1, 1) >= 0
@@ -120,7 +120,7 @@ def nearest_float(x: Fraction) -> np.float32:
 
 
 def unit_of(*arrays: np.ndarray) -> int:
-    """The exponent of a power of two of which all values, float32, are multiples."""
+    """The exponent of a power of two that divides all values, which are float32."""
     return min(int(np.frexp(a[a != 0].astype(np.float64))[1].min(initial=0)) for a in arrays) - 24
 
 

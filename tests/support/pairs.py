@@ -1,4 +1,4 @@
-"""Closest hits of many rays decided in integers, by asking about the few triangles that can matter.
+"""Closest hits of many rays decided in integers, against the few triangles that can be hit.
 
 The candidates come from brute force in double with a margin far above its rounding; what lies within the
 margin is decided in Python's integers (oracle.py), the rest is clear. For meshes of some hundred triangles.
@@ -16,7 +16,7 @@ MARGIN = 1e-7  # of barycentrics, and of t relative to the mesh's size; double i
 def exact_prims(
     vertices: np.ndarray, faces: np.ndarray, origins: np.ndarray, directions: np.ndarray
 ) -> np.ndarray:
-    """(n,) the lowest number of the triangles with the lowest t >= 0 of each ray, -1 where there is none."""
+    """(n,) the lowest number of the triangles with the lowest t >= 0 of each ray, -1 if there is none."""
     ray, face = _candidates(vertices, faces, origins, directions)
     first = np.searchsorted(ray, np.arange(len(origins) + 1))
     prim = np.full(len(origins), -1, np.int32)
@@ -37,7 +37,7 @@ def exact_prims(
 def exact_distances(
     vertices: np.ndarray, faces: np.ndarray, origins: np.ndarray, directions: np.ndarray, prim: np.ndarray
 ) -> list[Fraction]:
-    """Where each ray meets the plane of the triangle named for it, which it must hit."""
+    """t at which each ray meets the plane of its triangle, which it must hit."""
     pairs = _decide(vertices, faces, origins, directions, np.arange(len(prim)), prim)
     scale = Fraction(2) ** (unit_of(vertices, origins) - unit_of(directions))
     return [Fraction(int(h), int(d)) * scale for h, d in zip(*pairs, strict=True)]
@@ -78,7 +78,7 @@ def _decide(
     ray: np.ndarray,
     face: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """height and determinant of each pair: t is their ratio, in a common unit; None where the line misses."""
+    """height and determinant of each pair: t is their ratio, in a common unit; None if the line misses."""
     unit, direction_unit = unit_of(vertices, origins), unit_of(directions)
     o, d = integers(origins, unit)[ray], integers(directions, direction_unit)[ray]
     corners = integers(vertices, unit)[faces][face]

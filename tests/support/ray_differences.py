@@ -1,7 +1,7 @@
-"""Why two correct tracers may answer differently for one ray, decided in double precision.
+"""Reasons why two correct tracers may differ for one ray, decided in double precision.
 
-Both sides compute in float32, so each has a right to its own rounding, and to no more. A difference is
-explained when the exact ray passes so close to where the answer changes that rounding can move it across.
+Both sides compute in float32, so each may differ from the truth by its own rounding and no more. A difference
+is explained if the exact ray passes so close to a change of the result that rounding can move it across.
 How close is derived here to first order, with u = 2^-24, for a ray o + t d and a triangle v0 v1 v2. Its
 edges are e0 = v2 - v1, e1 = v1 - v0, e2 = v2 - v0, the longest L; its normal N = e1 x e2 has the angle
 theta to the ray. The reach S = max |v - o| bounds what is rounded first, v - o, with an error of u S; the
@@ -116,7 +116,7 @@ def distance_to_edges(unit_directions: Floats, relative: Floats) -> Floats:
 
 @dataclass(frozen=True)
 class Answers:
-    """What one side reports for n rays: t, and prim with -1 on a miss."""
+    """The results of one side for n rays: t, and prim, -1 on a miss."""
 
     t: NDArray[np.float32]
     prim: NDArray[np.int32]

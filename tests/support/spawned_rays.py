@@ -1,4 +1,4 @@
-"""Triangles of any size and place, hits in them, and what rays spawned there meet again."""
+"""Triangles of any size and place, hits in them, and rays spawned from these hits."""
 
 import numpy as np
 
@@ -13,7 +13,7 @@ SLIVERS = [(1.0, 1.0, 1e-3), (1.0, 1.0, 1e-4), (100.0, 1.0, 1e-3)]
 
 
 def triangles(magnitude: float, size: float, width: float, seed: int = 1) -> np.ndarray:
-    """(n,3,3) round a place of that magnitude."""
+    """(n,3,3) corners around a place of that magnitude."""
     random = np.random.default_rng(seed)
     corners = size * random.uniform(0.01, 1, (COUNT, 1, 1)) * random.standard_normal((COUNT, 3, 3))
     if width < 1:
@@ -37,14 +37,14 @@ def hits_of(
 
 
 def project(directions: np.ndarray, corners: np.ndarray) -> np.ndarray:
-    """Their part along the normals of triangles (n,3,3)."""
+    """The components of directions along the normals of triangles (n,3,3)."""
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     return (directions * normals).sum(axis=1, keepdims=True) * normals
 
 
 def ways_out(hits: wive.Hits, incoming: np.ndarray, flattest: float = 1e-9) -> np.ndarray:
-    """(k,n,3) directions: straight on, reflected, anywhere on both sides, and at slopes down to that."""
+    """(k,n,3) directions: straight on, reflected, random on both sides, and at slopes down to `flattest`."""
     random = np.random.default_rng(3)
     normals = np.where(hits.mask[:, None], hits.normals(), [0, 0, 1])
     incoming = incoming / np.linalg.norm(incoming, axis=1, keepdims=True)
@@ -54,7 +54,7 @@ def ways_out(hits: wive.Hits, incoming: np.ndarray, flattest: float = 1e-9) -> n
     slopes = 10 ** random.uniform(np.log10(flattest), -2, (3, len(normals), 1)) * random.choice(
         [-1, 1], (3, len(normals), 1)
     )
-    # and along the edges, where the direction is in the plane as well as its dtype can say
+    # and along the edges, where the direction is in the plane as precisely as its dtype allows
     corners = hits.vertices[hits.faces[np.maximum(hits.prim, 0)]].astype(np.float64)
     edges = (corners - np.roll(corners, 1, axis=1)).swapaxes(0, 1)
     edges /= abs(edges).max(axis=-1, keepdims=True)
@@ -63,7 +63,7 @@ def ways_out(hits: wive.Hits, incoming: np.ndarray, flattest: float = 1e-9) -> n
 
 
 def own_hits(scene: wive.Scene, hits: wive.Hits, incoming: np.ndarray, flattest: float = 1e-9) -> int:
-    """How many spawned rays meet the triangle that they left."""
+    """The number of spawned rays that hit the triangle they left."""
     count = 0
     for directions in ways_out(hits, incoming, flattest):
         again = scene.intersect_all(hits.spawn(directions), directions)

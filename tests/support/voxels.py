@@ -8,7 +8,7 @@ SIDE = 4
 
 
 def voxels(seed: int, share: float = 0.4) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The surface of random unit cells, two triangles a square, and which of the (4,4,4) cells are filled."""
+    """The surface of random unit cells, two triangles per square, and the (4,4,4) cells that are filled."""
     filled = np.random.default_rng(seed).random((SIDE, SIDE, SIDE)) < share
     padded = np.pad(filled, 1)
     points: dict[tuple[int, ...], int] = {}

@@ -1,4 +1,4 @@
-"""Every query over a batch of rays by a C++ kernel or a Warp lane form, and what it means to agree."""
+"""Every query over a batch of rays, by a C++ kernel or a Warp lane form, and a comparison of the results."""
 
 import dataclasses
 from collections.abc import Sequence
@@ -9,7 +9,7 @@ import warp as wp
 from wive import _cpu, warp_kernels
 from wive.warp_kernels.lanes.precision import PRECISIONS
 
-# One size for all trees here, so that a kernel is compiled once.
+# One stack size for all trees, so that each kernel is compiled once.
 STACK = 128
 
 INFINITE = np.full(1, np.inf, np.float32)
@@ -18,7 +18,7 @@ ZERO = np.zeros(1, np.float32)
 
 @dataclasses.dataclass(frozen=True)
 class Answers:
-    """What each query wrote, and how many steps it took."""
+    """The results of each query, and its steps."""
 
     t: np.ndarray
     prim: np.ndarray
@@ -90,7 +90,7 @@ def warp_answers(
 
 
 def assert_bit_identical(one: Answers, other: Answers, fields: Sequence[str] | None = None) -> None:
-    """Every number of the same bits (the bits of a NaN aside: which NaN a miss holds means nothing)."""
+    """Every number of the same bits (any NaN equals any other)."""
     for field in fields or [field.name for field in dataclasses.fields(Answers)]:
         mine, theirs = getattr(one, field), getattr(other, field)
         if mine.dtype.kind == "f":

@@ -1,4 +1,4 @@
-"""Arrays in are arrays out of the same library, over the same memory, on every backend."""
+"""Results are arrays of the rays' library, and share memory with it, on every backend."""
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ RAYS = random_rays(777, seed=2, low=-0.5, high=1.5)
 
 
 class Library:
-    """How tests make, read and recognise a library's arrays."""
+    """Makes, reads and recognises a library's arrays."""
 
     def __init__(self, name, device):
         self.name, self.device = name, device
@@ -70,7 +70,7 @@ def test_hits_come_back_in_the_library_of_the_rays(scene, library):
         found, wanted = library.read(getattr(hits, name)), getattr(expected, name)
         assert (found.dtype, found.shape) == (wanted.dtype, wanted.shape)
         np.testing.assert_array_equal(found, wanted)
-    # JAX has no float64 unless it is told to (jax_enable_x64).
+    # JAX has no float64 without jax_enable_x64.
     rounding = 1e-6 if library.name == "jax" else 1e-14
     np.testing.assert_allclose(library.read(hits.points()), expected.points(), rtol=rounding)
     np.testing.assert_allclose(library.read(hits.normals()), expected.normals(), rtol=rounding)
@@ -107,7 +107,7 @@ def test_all_hits_come_back_in_the_library_of_the_rays(scene, library):
     hits, stats = scene.intersect_all(*map(library.make, RAYS), stats=True)
     assert len(hits) == 777
     assert "777 rays" in repr(hits) and f"{len(expected.t)} hits" in repr(hits)
-    # JAX has neither int64 nor float64 unless it is told to (jax_enable_x64).
+    # JAX has neither int64 nor float64 without jax_enable_x64.
     exact = library.name != "jax"
     for name in ("offsets", "t", "prim", "uv", "counts", "ray"):
         found, wanted = library.read(getattr(hits, name)), getattr(expected, name)
@@ -173,7 +173,7 @@ def test_no_rays_give_no_hits_in_any_library(scene, library):
     assert library.read(every.uv).shape == (0, 2)
 
 
-def test_strided_rays_are_read_where_they_lie(scene, library):
+def test_strided_rays_are_not_copied(scene, library):
     if library.name in ("jax", "warp.vec3", "dlpack"):
         pytest.skip("no strided arrays of this library")
     rows = library.make(np.concatenate(RAYS, axis=1))
@@ -192,7 +192,7 @@ def test_rays_repeated_by_a_stride_of_zero_count_as_many(scene, backend, device)
     )
 
 
-def test_a_mesh_may_come_in_any_library(library):
+def test_a_mesh_may_be_arrays_of_any_library(library):
     if library.device != "cpu":
         pytest.skip("trees are built in host memory")
     scene = wive.Scene(library.make(MESH[0]), MESH[1])

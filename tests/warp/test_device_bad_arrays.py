@@ -1,4 +1,4 @@
-"""Arrays that a scene can't take are refused in one line: what, expected, got, how to mend it."""
+"""Arrays that a scene can't take are refused in one line: the argument, expected, got, the remedy."""
 
 import numpy as np
 import pytest

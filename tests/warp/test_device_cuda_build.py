@@ -1,4 +1,4 @@
-"""What CUDA devices run for pictures and hits compiles without one, and rounds as the CPU does."""
+"""The CUDA code for pictures and hits compiles without a device, and rounds like the CPU."""
 
 import re
 

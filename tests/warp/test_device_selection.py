@@ -1,4 +1,4 @@
-"""Which device a scene traces on: chosen, kept, listed, refused in one line."""
+"""The device that a scene traces on: chosen, kept, listed, refused in one line."""
 
 import pickle
 import subprocess
@@ -20,7 +20,7 @@ NO_DRIVER = "no NVIDIA driver found: install one, on a machine with an NVIDIA GP
 
 @pytest.fixture
 def only_cpu(monkeypatch):
-    """A machine without a GPU, whatever this one has."""
+    """A machine without a GPU."""
     monkeypatch.setattr(devices, "warp_devices", lambda: {"cuda:0": NO_DRIVER, "cpu": ""})
 
 
@@ -88,7 +88,9 @@ def test_saved_and_pickled_scenes_keep_their_device(tmp_path, device):
 
 
 @pytest.mark.usefixtures("only_cpu")
-def test_a_scene_of_another_machines_device_opens_where_asked(tmp_path, monkeypatch, usable_backends):
+def test_a_scene_of_another_machines_device_opens_on_the_requested_one(
+    tmp_path, monkeypatch, usable_backends
+):
     wive.Scene(*TRIANGLE, device="cpu").save(tmp_path / "warp")
     with np.load(tmp_path / "warp") as arrays:
         content = dict(arrays)
@@ -151,7 +153,7 @@ def test_a_device_that_is_not_there_is_refused(name, expected, tmp_path, capsys)
     ],
 )
 @pytest.mark.parametrize("options", [{"backend": "warp"}, {"device": "cpu"}, {"device": "cuda:0"}])
-def test_without_a_fitting_warp_the_way_to_get_it_is_told(monkeypatch, change, reason, options):
+def test_without_a_suitable_warp_the_error_says_how_to_get_it(monkeypatch, change, reason, options):
     monkeypatch.setattr(wive._cpu, "kernels", lambda: {"scalar": ""})
     change(monkeypatch)
     with pytest.raises(ValueError) as error:
@@ -160,7 +162,7 @@ def test_without_a_fitting_warp_the_way_to_get_it_is_told(monkeypatch, change, r
     assert wive.backends()["warp"].devices == {}
 
 
-# Python looks for modules where it stands; in the repository that is the source folder, which has no core.
+# Python first looks for modules in the working folder; the repository's source folder has no core.
 ELSEWHERE = tempfile.gettempdir()
 
 

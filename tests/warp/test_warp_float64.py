@@ -86,7 +86,7 @@ def layers(heights: np.ndarray) -> Mesh:
 
 @pytest.mark.parametrize("lanes", [8, 1])
 @pytest.mark.parametrize("accuracy", ACCURACIES)
-def test_the_nearest_of_hits_is_found_whose_t_are_one_float32_number(accuracy: str, lanes: int) -> None:
+def test_the_nearest_of_hits_whose_t_round_to_one_float32_is_found(accuracy: str, lanes: int) -> None:
     steps = np.random.default_rng(6).permutation(64)
     bvh = _cpu.Bvh(*layers(1.0 + 2.0**-30 + steps * 2.0**-52), accuracy)
     origins, directions = np.array([[0.25, 0.25, 0.0]]), np.array([[0.0, 0.0, 1.0]])

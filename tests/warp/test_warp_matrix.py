@@ -57,7 +57,7 @@ def test_every_backend_gives_the_same_bits_on_real_scenes(
 @pytest.mark.parametrize("nodes", FORMS)
 @pytest.mark.parametrize("accuracy", ACCURACIES)
 @pytest.mark.parametrize("count", [1, 3, 13, 101])
-def test_partial_blocks_answer_as_full_ones(count: int, accuracy: str, nodes: str) -> None:
+def test_partial_blocks_give_the_hits_of_full_ones(count: int, accuracy: str, nodes: str) -> None:
     bvh = _cpu.Bvh(*soup(3000, 2), accuracy, nodes=nodes)
     origins, directions = random_rays(count, 3)
     reference = cpu_answers(bvh, "scalar", origins, directions)
@@ -74,7 +74,7 @@ def test_block_size_does_not_change_the_answer(block_dim: int) -> None:
 
 
 @pytest.mark.parametrize("lanes", [8, 1])
-def test_groups_of_a_block_go_their_own_ways(lanes: int) -> None:
+def test_groups_of_a_block_diverge(lanes: int) -> None:
     """In one block: rays that miss at once, refused rays, short intervals and rays through everything."""
     bvh = _cpu.Bvh(*soup(6000, 5))
     origins, directions = random_rays(160, 6, 0.0, 1.0)
