@@ -2,7 +2,7 @@
 
 A tree is of float32 or float64: Real below. Its vertices, rays, t and uv have that dtype, none is converted.
 Shapes: n rays, v vertices, f faces, m inner nodes, b triangle blocks. Every array is C-contiguous.
-This is the inner door of the package: `wive.Scene` checks arguments and is what users call.
+Users call `wive.Scene`, which checks arguments; here only what memory safety needs is checked.
 """
 
 from typing import Any, Literal, TypeAlias
@@ -28,6 +28,14 @@ def avx512_form() -> Literal["full", "half"]:
     Raises ValueError where this machine can't run either, or where the environment variable
     WIVE_AVX512_FORM is none of "full", "half" and "race".
     """
+
+class Kernels:
+    """The kernels of one name, for the queries of `Bvh`: the first query with this handle looks them up."""
+
+    def __init__(self, name: str) -> None:
+        """Take a name of `kernels()`; whether it can run here shows at the first query."""
+    @property
+    def name(self) -> str: ...
 
 class Bvh:
     """The 8-wide tree over one mesh: never changed, shared by every backend."""
@@ -103,7 +111,7 @@ class Bvh:
         """Surface-area cost of inner nodes and of triangle blocks, relative to the root's area."""
     def intersect(
         self,
-        kernel: str,
+        kernel: Kernels | str,
         origins: NDArray[Real],
         directions: NDArray[Real],
         tmin: NDArray[Real],
@@ -120,7 +128,7 @@ class Bvh:
         """
     def occluded(
         self,
-        kernel: str,
+        kernel: Kernels | str,
         origins: NDArray[Real],
         directions: NDArray[Real],
         tmin: NDArray[Real],
@@ -132,7 +140,7 @@ class Bvh:
         """Whether anything lies in [tmin, tmax]: (n,) bool, and stats (n,3) or None."""
     def intersect_all(
         self,
-        kernel: str,
+        kernel: Kernels | str,
         origins: NDArray[Real],
         directions: NDArray[Real],
         tmin: NDArray[Real],
@@ -154,7 +162,7 @@ class Bvh:
         """
     def count(
         self,
-        kernel: str,
+        kernel: Kernels | str,
         origins: NDArray[Real],
         directions: NDArray[Real],
         tmin: NDArray[Real],
@@ -166,7 +174,7 @@ class Bvh:
         """How many triangles each ray meets in [tmin, tmax]: (n,) int32, and stats (n,3) or None."""
     def render_rows(
         self,
-        kernel: str,
+        kernel: Kernels | str,
         camera: NDArray[np.float32],
         image: NDArray[np.float32],
         row_begin: int,
@@ -178,6 +186,7 @@ class Bvh:
         threads: int = 0,
         in_flight: int = 0,
         tracer: tuple[int, int] | None = None,
+        check: bool = True,
     ) -> int:
         """Path-trace rows [row_begin, row_end) of image (height,width,3) in place; returns the rays traced.
 
@@ -185,7 +194,8 @@ class Bvh:
         edge's middle, and from its centre to the top edge's middle. Linear radiance under a white sky of
         radiance 1. Random numbers come from (pixel, sample, bounce) alone, so a picture does not depend on
         threads or kernel. tracer: addresses of a C function that traces in the kernel's place and of its
-        context (ForeignTracer in cpu/render.h), for comparisons.
+        context (ForeignTracer in cpu/render/render.h), for comparisons. check: check the mesh first, whose
+        arrays the caller may have changed since the tree was built; once per picture is enough.
         """
 
 def surface_points(

@@ -5,7 +5,6 @@
 #include "core/parallel.h"
 #include "exact_source.h"
 #include "kernels/avx512_form.h"
-#include "kernels/dispatch.h"
 #include "python/bindings.h"
 #include "render/render.h"
 
@@ -65,10 +64,10 @@ ForeignTracer foreign_tracer(const std::optional<std::pair<std::uintptr_t, std::
             reinterpret_cast<const void*>(addresses->second)};
 }
 
-std::uint64_t render(const PyBvh& self, const std::string& kernel, const Array<float>& camera, Array<float> image,
+std::uint64_t render(const PyBvh& self, const KernelArg& kernel, const Array<float>& camera, Array<float> image,
                      int row_begin, int row_end, int samples, int bounces, const std::string& albedo,
                      std::uint32_t seed, unsigned threads, unsigned in_flight,
-                     std::optional<std::pair<std::uintptr_t, std::uintptr_t>> tracer) {
+                     std::optional<std::pair<std::uintptr_t, std::uintptr_t>> tracer, bool check) {
     expect(self.bvh().precision() == Precision::float32, "render: expected a float32 scene, got float64");
     expect(camera.ndim() == 2 && camera.shape(0) == 4 && camera.shape(1) == 3, "camera: expected shape (4, 3)");
     expect(image.ndim() == 3 && image.shape(2) == 3, "image: expected shape (height, width, 3)");
@@ -79,7 +78,7 @@ std::uint64_t render(const PyBvh& self, const std::string& kernel, const Array<f
     const auto row = [&](py::ssize_t i) { return load_vec3(camera.data(i, 0)); };
     const RenderJob job = {self.bvh().view(),
                            self.mesh<float>(),
-                           find_kernels<float>(kernel),
+                           table_of<float>(kernel),
                            self.bvh().accuracy(),
                            self.bvh().node_form(),
                            {row(0), row(1), row(2), row(3)},
@@ -93,8 +92,10 @@ std::uint64_t render(const PyBvh& self, const std::string& kernel, const Array<f
                            in_flight,
                            foreign_tracer(tracer)};
     py::gil_scoped_release release;
-    Threads checkers(thread_count(threads));
-    check_mesh(job.mesh, checkers);  // its arrays are the caller's, who may have changed them since
+    if (check) {  // the arrays are the caller's, who may have changed them since the tree was built
+        Threads checkers(thread_count(threads));
+        check_mesh(job.mesh, checkers);
+    }
     return render_rows(job, row_begin, row_end, thread_count(threads));
 }
 
@@ -139,6 +140,9 @@ PYBIND11_MODULE(_cpu, m, pybind11::mod_gil_not_used()) {
         find_kernels<float>("avx512.full");  // throws if they can't run
         return avx512_form();
     });
+    py::class_<PyKernels>(m, "Kernels")
+        .def(py::init<std::string>(), py::arg("name"))
+        .def_property_readonly("name", &PyKernels::name);
     PyBvhClass bvh(m, "Bvh");
     for_each_precision([&]<class Real>(Real) {
         bvh.def(py::init(&build<Real>), array_arg("vertices"), array_arg("faces"), py::arg("accuracy") = "watertight",
@@ -206,7 +210,7 @@ PYBIND11_MODULE(_cpu, m, pybind11::mod_gil_not_used()) {
                                })
         .def("render_rows", &render, py::arg("kernel"), array_arg("camera"), array_arg("image"), py::arg("row_begin"),
              py::arg("row_end"), py::arg("samples"), py::arg("bounces"), py::arg("albedo"), py::arg("seed") = 0,
-             py::arg("threads") = 0, py::arg("in_flight") = 0, py::arg("tracer") = py::none());
+             py::arg("threads") = 0, py::arg("in_flight") = 0, py::arg("tracer") = py::none(), py::arg("check") = true);
     bind_queries(bvh);
     bind_surface(m);
 }

@@ -6,13 +6,16 @@
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>
 
+#include <atomic>
 #include <memory>
 #include <stdexcept>
 #include <string>
+#include <tuple>
 #include <utility>
 #include <variant>
 
 #include "build/builder.h"
+#include "kernels/dispatch.h"
 
 namespace wive {
 
@@ -83,6 +86,41 @@ private:
     BuildOptions options_;
     std::unique_ptr<Bvh> bvh_;
 };
+
+// The kernels of one name, looked up by the first query of each precision and then kept. Not earlier: to look up
+// "avx512" is to choose its form.
+class PyKernels {
+public:
+    explicit PyKernels(std::string name) : name_(std::move(name)) {}
+
+    template <class Real>
+    const KernelTable<Real>& table() const {
+        auto& found = std::get<Found<Real>>(tables_);
+        const KernelTable<Real>* table = found.load(std::memory_order_acquire);
+        if (table == nullptr) found.store(table = &find_kernels<Real>(name_), std::memory_order_release);
+        return *table;
+    }
+    const std::string& name() const { return name_; }
+
+private:
+    template <class Real>
+    using Found = std::atomic<const KernelTable<Real>*>;  // to a table that lives as long as the process
+
+    std::string name_;
+    mutable std::tuple<Found<float>, Found<double>> tables_ = {nullptr, nullptr};
+};
+
+// What queries take: a handle that has looked its kernels up, or a name, which is looked up at each call.
+using KernelArg = std::variant<const PyKernels*, std::string>;
+
+template <class Real>
+const KernelTable<Real>& table_of(const KernelArg& kernel) {
+    if (const auto* handle = std::get_if<const PyKernels*>(&kernel)) {
+        expect(*handle != nullptr, "kernel: expected Kernels or a name, got None");
+        return (*handle)->table<Real>();
+    }
+    return find_kernels<Real>(std::get<std::string>(kernel));
+}
 
 // Calls define(float{}), then define(double{}). Python picks the overload by dtype and tries float32 first.
 template <class Define>

@@ -1,7 +1,6 @@
 // The ray queries of a tree, as Python calls them.
 #include <optional>
 
-#include "kernels/dispatch.h"
 #include "kernels/gather.h"
 #include "kernels/trace.h"
 #include "python/bindings.h"
@@ -126,12 +125,12 @@ py::tuple intersect_all(const QueryCall<Real>& call) {
 
 template <class Real>
 void define_query(PyBvhClass& bvh, const char* name, py::tuple (*query)(const QueryCall<Real>&)) {
-    const auto call = [query](const PyBvh& self, const std::string& kernel, const Array<Real>& origins,
+    const auto call = [query](const PyBvh& self, const KernelArg& kernel, const Array<Real>& origins,
                               const Array<Real>& directions, const Array<Real>& tmin, const Array<Real>& tmax,
                               unsigned threads, unsigned in_flight, bool stats) {
         self.expect_precision<Real>();
         const RayBatch<Real> rays = ray_batch(origins, directions, tmin, tmax);
-        return query({self, find_kernels<Real>(kernel), rays, origins.shape(0), threads, in_flight, stats});
+        return query({self, table_of<Real>(kernel), rays, origins.shape(0), threads, in_flight, stats});
     };
     bvh.def(name, call, py::arg("kernel"), array_arg("origins"), array_arg("directions"), array_arg("tmin"),
             array_arg("tmax"), py::arg("threads") = 0, py::arg("in_flight") = 0, py::arg("stats") = false);
