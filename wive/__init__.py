@@ -3,7 +3,7 @@
 >>> scene = wive.Scene(vertices, faces)
 >>> hits = scene.intersect(origins, directions)   # closest hits: t, prim, uv
 >>> shadowed = scene.occluded(origins, directions)
->>> crossings = scene.intersect_all(origins, directions)   # every hit along every ray
+>>> all_hits = scene.intersect_all(origins, directions)   # every hit along every ray
 
 The method is that of Fuetterling, Lojewski, Pfreundt, Hamann and Ebert, "Accelerated Single Ray
 Tracing for Wide Vector Units", High-Performance Graphics 2017.
@@ -41,3 +41,7 @@ __all__ = [
     "render",
     "trimesh",
 ]
+
+
+def __dir__() -> list[str]:
+    return __all__

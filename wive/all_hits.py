@@ -1,24 +1,25 @@
 """What `Scene.intersect_all` returns: every hit along every ray."""
 
+from __future__ import annotations
+
 import operator
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from wive._internal.precision import Floats
+from wive._internal.wrapping import Wrapping, from_home
 from wive.hits import surface_normals, surface_points
 
 
-@dataclass(frozen=True, eq=False, repr=False)
 class AllHits:
     """All hits of n rays, h in all: ray by ray, each ray's by ascending t, at equal t by ascending prim.
 
-    Arrays are NumPy's where the rays were, else of the library and on the device that the rays came in;
-    `vertices` and `faces` are always NumPy's. `all_hits[i]` are those of ray i alone, again as `AllHits`, and
-    iterating goes through the rays.
+    Arrays are NumPy's if the rays were, else of the library and on the device that the rays came in;
+    `vertices` and `faces` are always NumPy's. `all_hits[i]` holds the hits of ray i, again as `AllHits`, and
+    iterating yields `all_hits[0]`, `all_hits[1]`, ...
 
     Attributes:
         offsets: (n+1,) int64, the hits of ray i are rows offsets[i] to offsets[i+1] of the arrays below.
@@ -31,16 +32,24 @@ class AllHits:
     t, uv and vertices are float64 for a float64 scene.
     """
 
-    offsets: NDArray[np.int64]
-    t: Floats
-    prim: NDArray[np.int32]
-    uv: Floats
-    vertices: Floats
-    faces: NDArray[np.int32]
+    __slots__ = ("__weakref__", "faces", "offsets", "prim", "t", "uv", "vertices")
+
+    def __init__(
+        self,
+        offsets: NDArray[np.int64],
+        t: Floats,
+        prim: NDArray[np.int32],
+        uv: Floats,
+        vertices: Floats,
+        faces: NDArray[np.int32],
+    ) -> None:
+        """Keep the arrays."""
+        self.offsets, self.t, self.prim, self.uv = offsets, t, prim, uv
+        self.vertices, self.faces = vertices, faces
 
     @property
     def counts(self) -> NDArray[np.int32]:
-        """(n,) int32 number of hits of each ray; computed at each call."""
+        """(n,) int32 number of hits per ray; computed at each call."""
         return np.diff(self.offsets).astype(np.int32)
 
     @property
@@ -60,14 +69,14 @@ class AllHits:
         """Number of rays."""
         return len(self.offsets) - 1
 
-    def __getitem__(self, i: int) -> "AllHits":
-        """The hits of ray i, views of the same arrays; IndexError where there is no such ray."""
+    def __getitem__(self, i: int) -> AllHits:
+        """The hits of ray i, in views of the same arrays; IndexError if there is no such ray."""
         first, last = (int(offset) for offset in self.offsets[row_of(i, len(self)) :][:2])
         rows = slice(first, last)
         offsets = np.array([0, last - first], np.int64)
         return AllHits(offsets, self.t[rows], self.prim[rows], self.uv[rows], self.vertices, self.faces)
 
-    def __iter__(self) -> Iterator["AllHits"]:
+    def __iter__(self) -> Iterator[AllHits]:
         """The hits of each ray in turn."""
         return (self[i] for i in range(len(self)))
 
@@ -77,35 +86,20 @@ class AllHits:
 
 
 class WrappedAllHits(AllHits):
-    """All hits in the arrays of another library: what `wrap` makes of those that they were computed in."""
+    """All hits in the arrays of another library than the backend's; `_home` holds the backend's arrays."""
 
-    _home: Any
-    _wrap: Callable[[Any], Any]
+    __slots__ = ("_home", "_wrapping")
 
-    def __init__(self, home: Any, wrap: Callable[[Any], Any]) -> None:
-        """Wrap the arrays of `home`, an `AllHits` or a `wive.warp_all_hits.WarpAllHits`."""
-        offsets, t, prim, uv = map(wrap, (home.offsets, home.t, home.prim, home.uv))
+    def __init__(self, home: Any, wrapping: Wrapping) -> None:
+        """Wrap the arrays of `home`, an `AllHits` or a `WarpAllHits`; all else is computed when used."""
+        offsets, t, prim, uv = map(wrapping.wrap, (home.offsets, home.t, home.prim, home.uv))
         super().__init__(offsets, t, prim, uv, home.vertices, home.faces)
-        object.__setattr__(self, "_home", home)
-        object.__setattr__(self, "_wrap", wrap)
+        self._home, self._wrapping = home, wrapping
 
-    @property
-    def counts(self) -> Any:
-        """(n,) int32 number of hits of each ray."""
-        return self._wrap(self._home.counts)
-
-    @property
-    def ray(self) -> Any:
-        """(h,) int64 ray of each hit."""
-        return self._wrap(self._home.ray)
-
-    def points(self) -> Any:
-        """(h,3) float64 hit points, as `AllHits.points`."""
-        return self._wrap(self._home.points())
-
-    def normals(self) -> Any:
-        """(h,3) float64 unit normals, as `AllHits.normals`."""
-        return self._wrap(self._home.normals())
+    counts = from_home(AllHits.counts)
+    ray = from_home(AllHits.ray)
+    points = from_home(AllHits.points)
+    normals = from_home(AllHits.normals)
 
     def __len__(self) -> int:
         """Number of rays."""
@@ -113,16 +107,16 @@ class WrappedAllHits(AllHits):
 
     def __getitem__(self, i: int) -> AllHits:
         """The hits of ray i; on a device this waits for it."""
-        return WrappedAllHits(self._home[i], self._wrap)
+        return WrappedAllHits(self._home[i], self._wrapping)
 
     def __repr__(self) -> str:
-        """Number of rays and of hits, and where they are."""
+        """Number of rays and of hits, and the library of their arrays."""
         library = type(self.t).__module__.partition(".")[0]
         return f"AllHits({len(self)} rays, {self._home.t.shape[0]} hits, in arrays of {library})"
 
 
 def row_of(i: int, count: int) -> int:
-    """`i` as an index from 0, counted from the end where it is negative."""
+    """`i` as an index from 0; a negative `i` counts from the end."""
     row = operator.index(i)
     if not -count <= row < count:
         raise IndexError(f"ray {row} of {count}: count from 0 to {count - 1}")

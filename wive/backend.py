@@ -1,5 +1,7 @@
 """Which backends there are, and which of them this machine can run."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 
 from wive import _cpu
@@ -18,27 +20,27 @@ class Backend:
     reason: str = ""
 
     @property
-    def devices(self) -> dict[str, "Backend"]:
+    def devices(self) -> dict[str, Backend]:
         """The backend's devices by name, each usable or not; none for CPU backends."""
         return {}
 
     @property
     def form(self) -> str:
-        """The form of the slab test, for the backend that has two and is usable; else empty."""
+        """The form of the slab test, if the backend has two and is usable; else empty."""
         return ""
 
 
 class Avx512Backend(Backend):
-    """The backend that uses the better of two forms; on some machines, asking for it races them first."""
+    """The backend that uses the better of two forms; on some machines, `form` races them first."""
 
     @property
     def form(self) -> str:
-        """ "full" or "half", by what is faster on this machine or by the environment: WIVE_AVX512_FORM."""
+        """ "full" or "half": the faster one on this machine, or as WIVE_AVX512_FORM says."""
         return _cpu.avx512_form() if self.usable else ""
 
 
 class WarpBackend(Backend):
-    """The backend that has devices; looking at them starts Warp."""
+    """The backend that has devices; listing them starts Warp."""
 
     @property
     def devices(self) -> dict[str, Backend]:
@@ -49,7 +51,7 @@ class WarpBackend(Backend):
 
 
 def backends() -> dict[str, Backend]:
-    """Every backend by name, best CPU backend first; `reason` is empty where `usable` is true."""
+    """Every backend by name, best CPU backend first; `reason` is empty if `usable` is true."""
     kernels = _cpu.kernels()
     found = {}
     for name in CPU_BACKENDS:
@@ -64,12 +66,10 @@ def backends() -> dict[str, Backend]:
 def resolve_backend(name: str, device: str | None = None) -> tuple[str, str | None]:
     """The usable backend and device meant; "auto" is the first usable CPU backend, and with a device Warp.
 
-    The device of a CPU backend is None. Raises ValueError or TypeError where there is no such backend or
-    device or this machine can't run it.
+    The device of a CPU backend is None. Raises ValueError or TypeError if there is no such backend or device
+    or this machine can't run it.
     """
-    found = backends()
-    usable = [candidate for candidate, backend in found.items() if backend.usable]
-    choice("backend", name, ("auto", *found))
+    choice("backend", name, ("auto", *CPU_BACKENDS, WARP))
     if device is not None:
         if not isinstance(device, str):
             raise TypeError(f"device must be a name such as 'cpu' or 'cuda:0', got {device!r:.60}")
@@ -79,11 +79,17 @@ def resolve_backend(name: str, device: str | None = None) -> tuple[str, str | No
                 "leave one of them out"
             )
         name = WARP
-    elif name == "auto":
-        name = usable[0]
-    if name not in usable:
+    if name != WARP:  # without a look at Warp's version, which takes longer than building a small scene
+        kernels = _cpu.kernels()
+        candidates = CPU_BACKENDS if name == "auto" else (name,)
+        for name in candidates:
+            if kernels.get(name) == "":
+                return name, None
+    found = backends()
+    if not found[name].usable:
+        usable = [candidate for candidate, backend in found.items() if backend.usable]
         raise ValueError(
             f"backend {name!r} can't run here ({found[name].reason}); "
             f"choose one of {', '.join(['auto', *usable])}"
         )
-    return name, resolve_device(device) if name == WARP else None
+    return name, resolve_device(device)

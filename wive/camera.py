@@ -1,5 +1,7 @@
 """A pinhole camera, and where to put it so that a mesh fills the picture."""
 
+from __future__ import annotations
+
 import math
 from dataclasses import dataclass
 
@@ -8,11 +10,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from wive._internal import arguments
 
-# A mesh this much thinner on one axis than on the others is taken to lie flat, that axis pointing up.
+# A mesh is flat, with up along its thinnest axis, if it is this much thinner on that axis than on the others.
 FLATNESS = 0.4
-# Where the eye stands as seen from the mesh: to the right, in front, above.
-STANDPOINT = (0.55, 1.0, 0.6)
-# Share of the half picture that a framed mesh fills.
+# From the mesh to the eye: to the right, in front, above.
+VIEWPOINT = (0.55, 1.0, 0.6)
+# The fraction of the picture that a framed mesh fills.
 FILLED = 0.94
 
 
@@ -21,12 +23,12 @@ class Camera:
     """A pinhole camera.
 
     Arguments:
-        eye: (3,) where it is.
-        target: (3,) what is in the middle of the picture.
+        eye: (3,) position of the camera.
+        target: (3,) the point in the middle of the picture.
         up: (3,) the direction that is up in the picture; of any length, not along the view.
         fov: vertical field of view in degrees, between 0 and 180.
 
-    Raises ValueError where these leave no picture: eye at the target, up along the view, fov out of range.
+    Raises ValueError if these leave no picture: eye at the target, up along the view, fov out of range.
     """
 
     eye: ArrayLike
@@ -41,7 +43,7 @@ class Camera:
     @classmethod
     def framing(
         cls, bounds: ArrayLike, up: ArrayLike | None = None, fov: float = 40.0, aspect: float = 16 / 9
-    ) -> "Camera":
+    ) -> Camera:
         """A camera from which a box just fits into the picture.
 
         Arguments:
@@ -55,9 +57,9 @@ class Camera:
             raise ValueError("bounds must be finite to be framed: the mesh has no triangle that can be hit")
         up_vector = _flat_axis(high - low) if up is None else arguments.vector("up", up)
         right, front = _ground_axes(up_vector)
-        standpoint = STANDPOINT @ np.stack([right, front, up_vector / np.linalg.norm(up_vector)])
+        viewpoint = VIEWPOINT @ np.stack([right, front, up_vector / np.linalg.norm(up_vector)])
         centre = (low + high) / 2
-        forward, to_right, to_top = cls(centre + standpoint, centre, up_vector, fov)._axes()
+        forward, to_right, to_top = cls(centre + viewpoint, centre, up_vector, fov)._axes()
 
         corners = np.stack(np.meshgrid(*np.stack([low, high], axis=1), indexing="ij"), axis=-1).reshape(-1, 3)
         tangent = FILLED * math.tan(math.radians(fov) / 2)
@@ -98,9 +100,9 @@ class Camera:
 def _squeeze(
     corners: NDArray[np.float64], forward: NDArray[np.float64], side: NDArray[np.float64], tangent: float
 ) -> tuple[float, float]:
-    """How far to the side and back an eye stands whose view just holds all corners between two planes.
+    """How far to the side and back to put the eye so that its view just contains all corners.
 
-    The planes meet in the eye and rise by `tangent` to either side as they go forward.
+    Two planes through the eye bound the view; they rise by `tangent` to either side per unit forward.
     """
     sideways, depth = corners @ side, tangent * (corners @ forward)
     one, other = np.max(sideways - depth), np.max(-sideways - depth)
@@ -116,7 +118,7 @@ def _flat_axis(extent: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _ground_axes(up: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Unit vectors to the right and towards the viewer: x and z where up is y, x and -y where up is z."""
+    """Unit vectors to the right and towards the viewer: x and z if up is y, x and -y if up is z."""
     across = np.eye(3)[1 if abs(up[0]) == np.max(abs(up)) else 0]
     front = np.cross(across, up)
     front /= np.linalg.norm(front)

@@ -104,7 +104,7 @@ def _add_trace(subparsers: "argparse._SubParsersAction[_Parser]") -> None:
         "or .npz of origins, directions and maybe tmin, tmax",
     )
     parser.add_argument("-o", "--output", required=True, metavar="NPZ", help="hits to write")
-    parser.add_argument("--all", action="store_true", help="every hit of each ray; writes offsets, too")
+    parser.add_argument("--all", action="store_true", help="every hit of each ray; also writes offsets")
     _add_scene_options(parser)
     _add_precision(parser)
     parser.set_defaults(run=commands.trace_rays)
@@ -136,5 +136,5 @@ def _add_precision(parser: argparse.ArgumentParser) -> None:
         "--precision",
         choices=("float32", "float64"),
         default="float32",
-        help="of coordinates and t; float64 where the file has them finer",
+        help="of coordinates and t; float64 if the file has finer ones",
     )

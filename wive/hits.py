@@ -1,8 +1,8 @@
 """What queries return: hits, and counters of the work behind them."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Any, ClassVar, NamedTuple
+from __future__ import annotations
+
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,6 +14,7 @@ from wive._internal.error_bounds import t_error_bounds
 from wive._internal.precision import Floats, real_of
 from wive._internal.rays import Rays
 from wive._internal.spawn import spawn_origins
+from wive._internal.wrapping import Wrapping, from_home
 
 
 class Stats(NamedTuple):
@@ -34,22 +35,21 @@ def stats_of(table: NDArray[np.int32] | None, library: Library) -> Stats | None:
 def surface_points(
     vertices: Floats, faces: NDArray[np.int32], prim: NDArray[np.int32], uv: Floats
 ) -> NDArray[np.float64]:
-    """(h,3) points at uv (h,2) of triangles prim (h,); NaN where prim is -1."""
+    """(h,3) points at uv (h,2) of triangles prim (h,); NaN if prim is -1."""
     return _cpu.surface_points(vertices, faces, np.ascontiguousarray(prim), np.ascontiguousarray(uv))
 
 
 def surface_normals(
     vertices: Floats, faces: NDArray[np.int32], prim: NDArray[np.int32]
 ) -> NDArray[np.float64]:
-    """(h,3) unit normals of triangles prim (h,), by the right-hand winding; NaN where prim is -1."""
+    """(h,3) unit normals of triangles prim (h,), by the right-hand winding; NaN if prim is -1."""
     return _cpu.surface_normals(vertices, faces, np.ascontiguousarray(prim))
 
 
-@dataclass(frozen=True, eq=False, repr=False)
 class Hits:
     """The closest hit of each of n rays.
 
-    Arrays are NumPy's where the rays were, else of the library and on the device that the rays came in;
+    Arrays are NumPy's if the rays were, else of the library and on the device that the rays came in;
     `vertices` and `faces` are always NumPy's.
 
     Attributes:
@@ -62,14 +62,13 @@ class Hits:
     t, uv and vertices are float64 for a float64 scene.
     """
 
+    __slots__ = ("__weakref__", "_accuracy", "_rays", "faces", "prim", "t", "uv", "vertices")
+
     t: Floats
     prim: NDArray[np.int32]
     uv: Floats
     vertices: Floats
     faces: NDArray[np.int32]
-    # Only kept for what is asked later: class variables to the dataclass, which would make fields of them.
-    _rays: ClassVar[Rays | None]
-    _accuracy: ClassVar[str]
 
     def __init__(
         self,
@@ -81,14 +80,13 @@ class Hits:
         rays: Rays | None = None,
         accuracy: str = "",
     ) -> None:
-        """Keep them; as a frozen dataclass would, in a third of the time."""
-        self.__dict__.update(
-            t=t, prim=prim, uv=uv, vertices=vertices, faces=faces, _rays=rays, _accuracy=accuracy
-        )
+        """Keep the arrays; a scene adds its rays and accuracy, for `error_bound` and `spawn`."""
+        self.t, self.prim, self.uv, self.vertices, self.faces = t, prim, uv, vertices, faces
+        self._rays, self._accuracy = rays, accuracy
 
     @property
     def mask(self) -> NDArray[np.bool_]:
-        """(n,) bool, true where the ray hit something."""
+        """(n,) bool, true if the ray hit something."""
         return self.prim >= 0
 
     def points(self) -> NDArray[np.float64]:
@@ -108,15 +106,17 @@ class Hits:
 
     @property
     def error_bound(self) -> NDArray[np.float64]:
-        """(n,) float64: t is at most so far from where the ray meets the plane of the triangle hit.
+        """(n,) float64 upper bound on |t - t*|, in the unit of t; NaN on a miss.
 
-        That is in exact arithmetic on rays and vertices in the scene's precision, in the unit of t; proved
-        for every accuracy, docs/accuracy.md, "The error of t". inf where double can't tell the ray from one
-        in the plane, NaN on a miss. In float64, because what remains after t was rounded to float32 is far
-        below what a float32 of that size resolves. For float64 scenes most of it is the error that judging
-        in double may have made: some 25 units in the last place of t where that is well-conditioned.
+        t* is the exact distance at which the ray, with vertices and rays in the scene's precision, meets the
+        plane of the triangle hit. The bound is proved for every accuracy, docs/accuracy.md, "The error of t".
+        It is inf if double arithmetic can't tell the ray from one in the plane. It comes in float64, because
+        what remains after t was rounded to float32 is far below what a float32 of that size resolves. For
+        float64 scenes most of the bound is the error that its own computation in double may have made: some
+        25 units in the last place of t if that is well-conditioned.
 
         Computed at each call, from the arrays that held the rays: it is wrong if you have changed them.
+        Raises ValueError if no scene returned these hits.
         """
         if self._rays is None:
             raise ValueError("error_bound needs hits that a scene returned: these were made without rays")
@@ -126,14 +126,14 @@ class Hits:
     def spawn(self, directions: ArrayLike) -> Floats:
         """(n,3) origins for rays that leave the surface from the points hit; NaN on a miss.
 
-        float32, or float64 for a float64 scene. Each lies on the side of its triangle that its direction
-        points to, just far enough that a ray from there with tmin = 0 doesn't hit this triangle in a scene of
-        the same accuracy and precision; docs/accuracy.md, "Spawned rays", has the proof, and what holds for
-        neighbours. All directions to one side have the same origin. Rays from the NaN of a miss miss.
+        float32, or float64 for a float64 scene. Each origin lies on the side of its triangle that its
+        direction points to, just far enough that a ray from there with tmin = 0 doesn't hit this triangle in
+        a scene of the same accuracy and precision; docs/accuracy.md, "Spawned rays", has the proof, and what
+        holds for neighbours. All directions to one side have the same origin. Rays from NaN origins miss.
 
         Arguments:
             directions: (n,3) real numbers, used in the scene's precision, or (3,) for all; of any length. On
-                a Warp device, as `Scene.intersect` takes them.
+                a Warp device, arrays as `Scene.intersect` takes them.
 
         Raises ValueError or TypeError, in one line naming the argument.
 
@@ -155,43 +155,26 @@ class Hits:
 
 
 class WrappedHits(Hits):
-    """Hits in the arrays of another library: what `wrap` makes of those that they were computed in."""
+    """Hits in the arrays of another library than the backend's; `_home` holds the backend's arrays."""
 
-    _home: Any
-    _wrap: Callable[[Any], Any]
+    __slots__ = ("_home", "_wrapping")
 
-    def __init__(self, home: Any, wrap: Callable[[Any], Any]) -> None:
-        """Wrap t, prim and uv of `home`, a `Hits` or a `WarpHits`; the rest when asked for."""
-        super().__init__(wrap(home.t), wrap(home.prim), wrap(home.uv), home.vertices, home.faces)
-        object.__setattr__(self, "_home", home)
-        object.__setattr__(self, "_wrap", wrap)
+    def __init__(self, home: Any, wrapping: Wrapping) -> None:
+        """Wrap t, prim and uv of `home`, a `Hits` or a `WarpHits`; all else is computed when used."""
+        t, prim, uv = map(wrapping.wrap, (home.t, home.prim, home.uv))
+        super().__init__(t, prim, uv, home.vertices, home.faces)
+        self._home, self._wrapping = home, wrapping
 
-    @property
-    def mask(self) -> Any:
-        """(n,) bool, true where the ray hit something."""
-        return self._wrap(self._home.mask)
-
-    def points(self) -> Any:
-        """(n,3) float64 hit points, as `Hits.points`."""
-        return self._wrap(self._home.points())
-
-    def normals(self) -> Any:
-        """(n,3) float64 unit normals, as `Hits.normals`."""
-        return self._wrap(self._home.normals())
-
-    @property
-    def error_bound(self) -> Any:
-        """(n,) float64, as `Hits.error_bound`."""
-        return self._wrap(self._home.error_bound)
-
-    def spawn(self, directions: ArrayLike) -> Any:
-        """(n,3) origins, as `Hits.spawn`."""
-        return self._wrap(self._home.spawn(directions))
+    mask = from_home(Hits.mask)
+    points = from_home(Hits.points)
+    normals = from_home(Hits.normals)
+    error_bound = from_home(Hits.error_bound)
+    spawn = from_home(Hits.spawn)
 
     def __len__(self) -> int:
         """Number of rays."""
-        return int(self._home.t.shape[0])
+        return len(self._home)
 
     def __repr__(self) -> str:
-        """Number of rays and where their hits are."""
+        """Number of rays, and the library of their hits."""
         return f"Hits({len(self)} rays, in arrays of {type(self.t).__module__.partition('.')[0]})"

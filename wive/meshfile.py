@@ -1,4 +1,6 @@
-"""Meshes from files: whatever trimesh reads, and npz files of two arrays."""
+"""Meshes from files: npz files of two arrays, and whatever trimesh reads."""
+
+from __future__ import annotations
 
 import os
 from typing import Any
@@ -20,11 +22,11 @@ def load_mesh(
     file that holds a scene are placed and joined.
 
     Arguments:
-        dtype: of the vertices, np.float32 or np.float64. Few files hold more than float32; coordinates as of
-            surveys do, and a `Scene` over them as float64 keeps it.
+        dtype: of the vertices, np.float32 or np.float64. Few files hold more than float32; those of survey
+            coordinates do, and a float64 `Scene` keeps it.
 
-    Raises OSError where the file can't be read, ValueError where it is no mesh or has no triangles,
-    ImportError where trimesh is missing. Each message is one line that names the file.
+    Raises OSError if the file can't be read, ValueError if it is no mesh or has no triangles, ImportError if
+    trimesh is missing. Each message is one line that names the file.
     """
     real = real_named(dtype)
     name = check_input(path)
@@ -38,7 +40,7 @@ def load_mesh(
         vertices, faces = _load_with_trimesh(name)
     if faces.size == 0:
         raise ValueError(f"{name}: has no triangles")
-    is_real = vertices.dtype.kind in "fiu"  # what is not, a Scene refuses
+    is_real = vertices.dtype.kind in "fiu"  # a Scene refuses other dtypes
     return real.array(vertices) if is_real else vertices, faces
 
 
@@ -53,7 +55,7 @@ def _load_with_trimesh(name: str) -> tuple[NDArray[Any], NDArray[Any]]:
         raise ValueError(f"{name}: is empty")
     try:
         mesh = trimesh.load(name, force="mesh", process=False)
-    except Exception as error:  # each format's loader fails on bad bytes in a way of its own
+    except Exception as error:  # what loaders raise on bad bytes differs by format
         reason = " ".join(str(error).split()) or type(error).__name__
         hint = '; try pip install "trimesh[easy]"' if isinstance(error, ImportError) else ""
         raise ValueError(f"{name}: not a mesh that trimesh can read ({reason:.120}{hint})") from error

@@ -1,6 +1,8 @@
 """Pictures: path tracing in bands of rows, and PNG files of them."""
 
-from collections.abc import Callable, Iterator
+from __future__ import annotations
+
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal
 
@@ -16,7 +18,7 @@ from wive.scene import Scene
 Image = NDArray[np.float32]
 
 ALBEDOS = ("gray", "normals")
-# Paths per band: some tenths of a second, so that the bar moves and Ctrl-C is heard between bands.
+# Paths per band: some tenths of a second, so that the bar moves; Ctrl-C is answered between bands.
 BAND_PATHS = 300_000
 CUDA_BAND_PATHS = 1 << 20
 LARGEST_SIDE = 65_536
@@ -24,7 +26,7 @@ LARGEST_SIDE = 65_536
 
 @dataclass(frozen=True, kw_only=True)
 class Settings:
-    """What makes a picture besides scene and camera; the fields are the arguments of `render`."""
+    """What a picture depends on besides scene and camera; the fields are the arguments of `render`."""
 
     width: int = 1280
     height: int = 720
@@ -66,12 +68,13 @@ def render(
         spp: samples (paths) per pixel.
         bounces: diffuse bounces after which a path ends.
         albedo: "gray", or "normals" for surfaces coloured by their normal.
-        seed: another seed is another picture of the same noise level. Random numbers come from (seed, pixel,
-            sample, bounce) alone, so the picture depends on neither `threads` nor the scene's backend.
+        seed: another seed gives another picture of the same noise level. Random numbers come from (seed,
+            pixel, sample, bounce) alone, so the picture depends on neither `threads` nor the scene's backend.
+        threads: how many to use; None is every core. For CPU backends.
         progress: show a progress bar on stderr (needs tqdm).
 
-    Returns (height, width, 3) float32 linear radiance, top row first. Raises ValueError that names a bad
-    argument, such as a float64 scene: only float32 scenes are rendered.
+    Returns (height, width, 3) float32 linear radiance, top row first. Raises ValueError or TypeError that
+    names a bad argument, such as a float64 scene: only float32 scenes are rendered.
     """
     settings = Settings(
         width=width, height=height, spp=spp, bounces=bounces, albedo=albedo, seed=seed, threads=threads
@@ -82,7 +85,7 @@ def render(
 def render_counted(
     scene: Scene, camera: Camera | None, settings: Settings, *, progress: bool
 ) -> tuple[Image, int]:
-    """The picture as `render` returns it, and how many rays were traced for it."""
+    """The picture that `render` returns, and how many rays were traced for it."""
     if scene.precision != "float32":
         raise ValueError(
             "scene must be of float32 vertices to be rendered, got float64: "
@@ -93,26 +96,15 @@ def render_counted(
         camera = Camera.framing(scene.bounds, aspect=width / height)
     frame = camera.frame(width, height)
     image = np.zeros((height, width, 3), np.float32)
-    render_rows = _rows_renderer(scene, frame, image, settings)
+    tracer = scene._tracer  # one picture shows one shape, whatever refits happen meanwhile
+    arguments.refuse_others_options(tracer.backend, tracer.options, threads=settings.threads)
+    render_rows = tracer.rows_renderer(frame, image, settings)
     rays = 0
     with progress_bar(height, "row", "rendering", show=progress) as advance:
         for begin, end in _bands(height, width * settings.spp, scene.device):
             rays += render_rows(begin, end)
             advance(end - begin)
     return image, rays
-
-
-def _rows_renderer(scene: Scene, frame: Image, image: Image, settings: Settings) -> Callable[[int, int], int]:
-    """A function that renders rows [begin, end) into `image` and returns how many rays it traced."""
-    what = (settings.spp, settings.bounces, settings.albedo, settings.seed)
-    if scene._warp is not None:
-        from wive.warp_kernels.scene.render import PictureRenderer
-
-        renderer: Callable[[int, int], int] = PictureRenderer(scene._warp, frame, image, *what).render_rows
-        return renderer
-    threads = arguments.threads(settings.threads)
-    bvh = scene._bvh  # one picture shows one shape, whatever refits happen meanwhile
-    return lambda begin, end: bvh.render_rows(scene.backend, frame, image, begin, end, *what, threads)
 
 
 def check_png_output(path: PathLike) -> str:

@@ -1,37 +1,43 @@
 """The scene: a mesh, the tree over it, and the queries users make."""
 
+from __future__ import annotations
+
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, Literal, overload
+from typing import TYPE_CHECKING, Any, Literal, TypeVar, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from wive import _cpu
 from wive._internal import arguments
-from wive._internal.arrays import NUMPY, host_array
-from wive._internal.crossings import CrossingQueries, LanesOption
+from wive._internal.arguments import LanesOption, Work
+from wive._internal.arrays import host_array
+from wive._internal.cpu_tracer import CpuTracer
 from wive._internal.files import PathLike
-from wive._internal.precision import FLOAT32, Floats, real_of
-from wive._internal.properties import SceneProperties
-from wive._internal.rays import check_rays
-from wive._internal.refit import Refittable
+from wive._internal.precision import FLOAT32, Floats, Precision, real_of
+from wive._internal.rays import Rays, check_rays
 from wive._internal.storage import Options, read_scene, write_scene
+from wive._internal.tracer import Tracer
+from wive.all_hits import AllHits
 from wive.backend import resolve_backend
-from wive.hits import Hits, Stats, WrappedHits, stats_of
+from wive.hits import Hits, Stats
 from wive.meshfile import load_mesh
 
 if TYPE_CHECKING:
-    from wive.warp_kernels.scene.tracer import WarpTracer
+    from typing_extensions import Unpack
+
+    from wive._internal.arguments import Counted, Given, Plain
+    from wive.warp_kernels import Tree
+
+Answer = TypeVar("Answer")
 
 
-class Scene(Refittable, CrossingQueries, SceneProperties):
+class Scene:
     """A triangle mesh that answers ray queries.
 
     Several threads may query it at once, and so may processes forked from this one. Only `refit` changes it,
     all at once: a query sees the old positions or the new ones.
     """
-
-    _warp: "WarpTracer | None" = None
 
     def __init__(
         self,
@@ -48,18 +54,18 @@ class Scene(Refittable, CrossingQueries, SceneProperties):
 
         Arguments:
             vertices: (v,3) real numbers. An array of float64 makes a float64 scene: vertices, rays, t and uv
-                are float64, for coordinates such as surveys'. All else, lists too, is used as float32.
-            faces: (f,3) integers, three vertices a triangle, counter-clockwise as seen from the side that its
-                normal points to. Zero-area triangles keep their number and are never hit.
+                are float64, for coordinates such as surveys'. All else, lists included, is used as float32.
+            faces: (f,3) integers, three vertices per triangle, counter-clockwise as seen from the side that
+                its normal points to. Zero-area triangles keep their number and are never hit.
             backend: "auto" (the fastest CPU backend this machine has) or a name in `wive.backends()`.
-            device: where backend "warp" traces, by Warp's names: "cpu", "cuda:0", ...; None is the first CUDA
-                device, else "cpu". A device alone implies backend "warp"; CPU backends take none.
+            device: the device of backend "warp", by Warp's names: "cpu", "cuda:0", ...; None is the first
+                CUDA device, else "cpu". A device alone implies backend "warp"; CPU backends take none.
             accuracy: "watertight" (rays never slip between triangles that share an edge or vertex), "fast",
                 or "exact" (hits, their order, t and uv are those of exact arithmetic, rounded once; float32
                 numbers only, whatever their dtype).
             nodes: "float32", or "compressed": the same hits, under two thirds the bytes, for large trees.
-            quality: "medium", or "high" for a tree that takes about four times as long to build and gives
-                the same hits in fewer steps: a sixth fewer where sizes differ much, none in even meshes.
+            quality: "medium", or "high" for a tree that takes about four times as long to build and gives the
+                same hits in fewer steps: a sixth fewer if triangle sizes differ much, none in even meshes.
 
         C-contiguous float32 or float64 vertices and int32 faces are kept, not copied: don't change them.
 
@@ -72,46 +78,25 @@ class Scene(Refittable, CrossingQueries, SceneProperties):
         self._options = Options(
             backend=backend, device=device, accuracy=accuracy, nodes=nodes, quality=quality
         )
-        self._backend, self._device = resolve_backend(backend, device)
+        found, place = resolve_backend(backend, device)
         mesh = arguments.mesh(host_array("vertices", vertices), host_array("faces", faces), accuracy)
-        vertices, self._faces = map(arguments.read_only, mesh)
-        self._real = real_of(vertices)
-        self._bvh = _cpu.Bvh(vertices, self._faces, accuracy, nodes=nodes, quality=quality)
-        if self._device is not None:
-            from wive.warp_kernels.scene.tracer import WarpTracer
-
-            self._warp = WarpTracer(self._bvh, vertices, self._faces, self._device)
+        points, self._faces = map(arguments.read_only, mesh)
+        self._real = real_of(points)
+        bvh = _cpu.Bvh(points, self._faces, accuracy, nodes=nodes, quality=quality)
+        self._tracer = _tracer(bvh, self._faces, found, place)
 
     @classmethod
-    def from_file(cls, path: PathLike, *, dtype: DTypeLike = np.float32, **kwargs: Any) -> "Scene":
+    def from_file(cls, path: PathLike, *, dtype: DTypeLike = np.float32, **kwargs: Any) -> Scene:
         """A scene from a mesh file, read by `wive.load_mesh` in that dtype; keywords are those of `Scene`."""
         return cls(*load_mesh(path, dtype), **kwargs)
 
     @overload
     def intersect(
-        self,
-        origins: ArrayLike,
-        directions: ArrayLike,
-        tmin: ArrayLike = 0.0,
-        tmax: ArrayLike = np.inf,
-        *,
-        threads: int | None = None,
-        in_flight: int | None = None,
-        lanes: LanesOption = "auto",
-        stats: Literal[False] = False,
+        self, origins: Given, directions: Given, tmin: Given = 0, tmax: Given = np.inf, **how: Unpack[Plain]
     ) -> Hits: ...
     @overload
     def intersect(
-        self,
-        origins: ArrayLike,
-        directions: ArrayLike,
-        tmin: ArrayLike = 0.0,
-        tmax: ArrayLike = np.inf,
-        *,
-        threads: int | None = None,
-        in_flight: int | None = None,
-        lanes: LanesOption = "auto",
-        stats: Literal[True],
+        self, origins: Given, directions: Given, tmin: Given = 0, tmax: Given = np.inf, **how: Unpack[Counted]
     ) -> tuple[Hits, Stats]: ...
     def intersect(
         self,
@@ -133,60 +118,32 @@ class Scene(Refittable, CrossingQueries, SceneProperties):
                 length. Warp, torch and DLPack arrays give hits in arrays of their library, on their device,
                 without passing through the host; for a Warp scene they must lie on its device and have its
                 dtype. No call waits for the GPU then: with Warp's memory pools, CUDA graphs can capture it.
-            tmin, tmax: a number, or (n,) one a ray, in multiples of the direction's length.
+            tmin, tmax: a number, or (n,) one per ray, in multiples of the direction's length.
             threads: how many to use; None is every core. For CPU backends.
             in_flight: rays interleaved per thread; None leaves it to wive, 1 is plain single-ray traversal.
                 For CPU backends.
-            lanes: for backend "warp": 8, a thread owns a ray (throughput), 1, eight threads do (latency), or
-                "auto", chosen by device and number of rays.
+            lanes: lanes of a node per thread, for backend "warp": 8 gives a ray one thread (throughput), 1
+                gives it eight (latency), "auto" chooses by device and number of rays.
             stats: return `(hits, stats)`, with what each ray visited.
 
         Results depend on none of `threads`, `in_flight` and `lanes`, nor on how rays are split into batches.
-        A ray misses whose origin is NaN or infinite, whose direction is NaN, infinite or zero, or whose tmin
-        is above its tmax.
+        A ray misses if its origin is NaN or infinite, its direction is NaN, infinite or zero, or its tmin is
+        above its tmax.
 
-        Raises ValueError or TypeError, in one line naming the argument.
+        Raises ValueError or TypeError, in one line naming the argument; an option that is only for other
+        backends than the scene's raises ValueError.
         """
-        rays = check_rays(origins, directions, tmin, tmax, self._backend, self._device)
-        chosen = arguments.lanes(lanes, self._warp is not None)
-        work = arguments.work(threads, in_flight, stats)
-        counts: Stats | None
-        if self._warp is not None:
-            hits, counts = self._warp.intersect(rays, chosen, bool(stats))
-        else:
-            bvh = self._bvh
-            t, prim, uv, table = bvh.intersect(self._backend, *rays.numpy(self._real), *work)
-            hits = Hits(t, prim, uv, bvh.vertices, self._faces, rays, self._options["accuracy"])
-            counts = stats_of(table, rays.library)
-            if rays.library is not NUMPY:
-                hits = WrappedHits(hits, rays.library.from_numpy)
-        return hits if counts is None else (hits, counts)
+        return self._ask(
+            self._tracer.intersect, (origins, directions, tmin, tmax), threads, in_flight, lanes, stats
+        )
 
     @overload
     def occluded(
-        self,
-        origins: ArrayLike,
-        directions: ArrayLike,
-        tmin: ArrayLike = 0.0,
-        tmax: ArrayLike = np.inf,
-        *,
-        threads: int | None = None,
-        in_flight: int | None = None,
-        lanes: LanesOption = "auto",
-        stats: Literal[False] = False,
+        self, origins: Given, directions: Given, tmin: Given = 0, tmax: Given = np.inf, **how: Unpack[Plain]
     ) -> NDArray[np.bool_]: ...
     @overload
     def occluded(
-        self,
-        origins: ArrayLike,
-        directions: ArrayLike,
-        tmin: ArrayLike = 0.0,
-        tmax: ArrayLike = np.inf,
-        *,
-        threads: int | None = None,
-        in_flight: int | None = None,
-        lanes: LanesOption = "auto",
-        stats: Literal[True],
+        self, origins: Given, directions: Given, tmin: Given = 0, tmax: Given = np.inf, **how: Unpack[Counted]
     ) -> tuple[NDArray[np.bool_], Stats]: ...
     def occluded(
         self,
@@ -201,39 +158,203 @@ class Scene(Refittable, CrossingQueries, SceneProperties):
         stats: bool = False,
     ) -> NDArray[np.bool_] | tuple[NDArray[np.bool_], Stats]:
         """(n,) bool: whether each ray hits anything with tmin <= t <= tmax; arguments as for `intersect`."""
-        rays = check_rays(origins, directions, tmin, tmax, self._backend, self._device)
-        chosen = arguments.lanes(lanes, self._warp is not None)
-        work = arguments.work(threads, in_flight, stats)
-        counts: Stats | None
-        if self._warp is not None:
-            mask, counts = self._warp.occluded(rays, chosen, bool(stats))
-        else:
-            found, table = self._bvh.occluded(self._backend, *rays.numpy(self._real), *work)
-            mask, counts = rays.library.from_numpy(found), stats_of(table, rays.library)
-        return mask if counts is None else (mask, counts)
+        return self._ask(
+            self._tracer.occluded, (origins, directions, tmin, tmax), threads, in_flight, lanes, stats
+        )
+
+    @overload
+    def intersect_all(
+        self, origins: Given, directions: Given, tmin: Given = 0, tmax: Given = np.inf, **how: Unpack[Plain]
+    ) -> AllHits: ...
+    @overload
+    def intersect_all(
+        self, origins: Given, directions: Given, tmin: Given = 0, tmax: Given = np.inf, **how: Unpack[Counted]
+    ) -> tuple[AllHits, Stats]: ...
+    def intersect_all(
+        self,
+        origins: ArrayLike,
+        directions: ArrayLike,
+        tmin: ArrayLike = 0.0,
+        tmax: ArrayLike = np.inf,
+        *,
+        threads: int | None = None,
+        in_flight: int | None = None,
+        lanes: LanesOption = "auto",
+        stats: bool = False,
+    ) -> AllHits | tuple[AllHits, Stats]:
+        """Every triangle that each ray meets with tmin <= t <= tmax, each once, however many there are.
+
+        Arguments are those of `intersect`. Each ray's hits are sorted by ascending t, at equal t by ascending
+        prim; the first is what `intersect` returns. A ray through an edge or a vertex meets every triangle
+        there. Accuracy "exact" differs: there a ray passes a closed surface as often as one beside the edge,
+        so that parity is always right, and a hit of `intersect` that only touches an edge may be missing.
+
+        CPU backends trace once; a hit takes 24 bytes until all are found, then 16 (in float64 40, then 28).
+        Warp traces twice, to count and to fill, and waits for the device in between: CUDA graphs can't
+        capture this query.
+
+        Raises ValueError or TypeError, in one line naming the argument, and MemoryError if the hits don't fit
+        into memory (RuntimeError on a Warp device that is full).
+        """
+        return self._ask(
+            self._tracer.intersect_all, (origins, directions, tmin, tmax), threads, in_flight, lanes, stats
+        )
+
+    @overload
+    def count(
+        self, origins: Given, directions: Given, tmin: Given = 0, tmax: Given = np.inf, **how: Unpack[Plain]
+    ) -> NDArray[np.int32]: ...
+    @overload
+    def count(
+        self, origins: Given, directions: Given, tmin: Given = 0, tmax: Given = np.inf, **how: Unpack[Counted]
+    ) -> tuple[NDArray[np.int32], Stats]: ...
+    def count(
+        self,
+        origins: ArrayLike,
+        directions: ArrayLike,
+        tmin: ArrayLike = 0.0,
+        tmax: ArrayLike = np.inf,
+        *,
+        threads: int | None = None,
+        in_flight: int | None = None,
+        lanes: LanesOption = "auto",
+        stats: bool = False,
+    ) -> NDArray[np.int32] | tuple[NDArray[np.int32], Stats]:
+        """(n,) int32: how many hits `intersect_all` finds for each ray; arguments as for `intersect`."""
+        return self._ask(
+            self._tracer.count, (origins, directions, tmin, tmax), threads, in_flight, lanes, stats
+        )
+
+    def refit(self, vertices: ArrayLike) -> None:
+        """Move the vertices: new positions, the same faces.
+
+        The tree keeps its shape and gets new boxes, in a sixth of the time that building takes. Hits are
+        those of a new scene, bit for bit; only their speed depends on how well the old shape suits the new
+        positions. It suits them well if the mesh bends or moves as a whole. If neighbours part, rays take
+        more steps with every refit, and a new `Scene` is worth its price. Triangles that lose their area are
+        no longer hit; if one that had none gains some, the tree is built anew, and so are compressed trees.
+
+        Queries that run in other threads meanwhile finish on the old positions. So does a tree for
+        `wive.warp_kernels` that was taken from `tree` before: take it again. Of two refits at once the one
+        that ends last counts.
+
+        Arguments:
+            vertices: (v,3) real numbers, as many as before, used in the scene's precision. A C-contiguous
+                array of that dtype is kept, not copied, and may be the scene's own, changed in place; points
+                and normals of earlier hits follow it then.
+
+        Raises ValueError or TypeError as construction does, and leaves the scene as it was.
+        """
+        points = arguments.moved_vertices(host_array("vertices", vertices), len(self.vertices), self._real)
+        self._tracer = self._tracer.refitted(arguments.read_only(points))
 
     def save(self, path: PathLike) -> None:
         """Write the scene to a file that `wive.load` reads; the file is whole or absent."""
-        write_scene(path, self._vertices, self._faces, self._options)
+        write_scene(path, self.vertices, self._faces, self._options)
+
+    @property
+    def vertices(self) -> Floats:
+        """(v,3) float32 or float64 as `precision` says, read-only."""
+        return self._bvh.vertices
+
+    @property
+    def faces(self) -> NDArray[np.int32]:
+        """(f,3) int32, read-only."""
+        return self._faces
+
+    @property
+    def bounds(self) -> Floats:
+        """(2,3) lowest and highest corner of the triangles that can be hit; inf, -inf without any.
+
+        float32 or float64 as `precision` says.
+        """
+        return self._bvh.bounds
+
+    @property
+    def memory(self) -> int:
+        """Bytes of the tree: nodes and leaves."""
+        return self._bvh.memory
+
+    @property
+    def backend(self) -> str:
+        """The backend that traces: never "auto"."""
+        return self._tracer.backend
+
+    @property
+    def device(self) -> str | None:
+        """The Warp device that traces, such as "cuda:0"; None for CPU backends."""
+        return self._tracer.device
+
+    @property
+    def tree(self) -> Tree:
+        """The tree on the scene's Warp device, for `wive.warp_kernels`; ValueError for CPU backends."""
+        return self._tracer.tree
+
+    @property
+    def accuracy(self) -> str:
+        """ "watertight", "fast" or "exact"."""
+        return self._bvh.accuracy
+
+    @property
+    def precision(self) -> Precision:
+        """ "float32" or "float64": the dtype of vertices, rays, bounds, t and uv."""
+        return self._real.name
+
+    @property
+    def nodes(self) -> str:
+        """ "float32" or "compressed"."""
+        return self._bvh.node_form
+
+    def __len__(self) -> int:
+        """Number of triangles."""
+        return len(self._faces)
 
     def __repr__(self) -> str:
         """Size and options."""
         shown = f"{len(self)} triangles, backend={self.backend!r}, accuracy={self.accuracy!r}"
         return f"Scene({shown})" if self._real is FLOAT32 else f"Scene({shown}, precision='float64')"
 
-    def __reduce__(self) -> tuple[Callable[..., "Scene"], tuple[Any, ...]]:
-        """Pickle the mesh and the options; the tree is rebuilt where they are loaded."""
-        return _rebuild, (self._vertices, self._faces, self._options)
+    def __reduce__(self) -> tuple[Callable[..., Scene], tuple[Any, ...]]:
+        """Pickle the mesh and the options; unpickling builds the tree again."""
+        return _rebuild, (self.vertices, self._faces, self._options)
+
+    @property
+    def _bvh(self) -> _cpu.Bvh:
+        return self._tracer.bvh
+
+    def _ask(
+        self,
+        query: Callable[[Rays, Work], tuple[Answer, Stats | None]],
+        rays: tuple[ArrayLike, ArrayLike, ArrayLike, ArrayLike],
+        threads: int | None,
+        in_flight: int | None,
+        lanes: LanesOption,
+        stats: bool,
+    ) -> Answer | tuple[Answer, Stats]:
+        """Check a query's arguments; its answer, with the counters if `stats`."""
+        tracer = self._tracer
+        checked = check_rays(*rays, tracer.backend, tracer.device)
+        work = arguments.work(tracer.backend, tracer.options, threads, in_flight, lanes, stats)
+        answer, counters = query(checked, work)
+        return answer if counters is None else (answer, counters)
+
+
+def _tracer(bvh: _cpu.Bvh, faces: NDArray[np.int32], backend: str, device: str | None) -> Tracer:
+    if device is None:
+        return CpuTracer(bvh, faces, backend)
+    from wive.warp_kernels.scene.tracer import WarpTracer
+
+    return WarpTracer(bvh, faces, device)
 
 
 def load(path: PathLike, *, backend: str | None = None, device: str | None = None) -> Scene:
     """The scene in a file that `Scene.save` wrote, with the options it was made with.
 
-    `backend` or `device`, where given, replace both saved ones: a scene saved with "avx512" or on "cuda:0"
-    opens with backend "auto" where these are missing.
+    `backend` or `device`, if given, replaces both saved ones: a scene saved with "avx512" or on "cuda:0"
+    opens with backend "auto" on a machine that lacks these.
 
-    Raises OSError where the file can't be read, ValueError where it is not a saved scene or its backend or
-    device can't be used here.
+    Raises OSError if the file can't be read, ValueError if it is not a saved scene or its backend or device
+    can't be used here.
     """
     vertices, faces, options = read_scene(path)
     if backend is not None or device is not None:

@@ -3,8 +3,10 @@
 >>> mesh.ray = wive.trimesh.RayMeshIntersector(mesh)
 >>> mesh.contains(points)
 
-Nothing of trimesh is imported here: the mesh that is given brings what is needed.
+This module does not import trimesh: it uses the mesh that it is given.
 """
+
+from __future__ import annotations
 
 from typing import Any, Literal, NamedTuple
 
@@ -18,7 +20,7 @@ from wive.scene import Scene
 Float64 = NDArray[np.float64]
 Int64 = NDArray[np.int64]
 
-# Along which lines rays leave a point, until those of both ways agree; the first is trimesh's.
+# Directions of the rays of `contains_points`, tried until a ray and its opposite agree; trimesh uses the first.
 DIRECTIONS = (
     (0.4395064455, 0.617598629942, 0.652231566745),
     (-0.7312847092, 0.2291845177, 0.6424302511),
@@ -27,7 +29,7 @@ DIRECTIONS = (
 
 
 class _Placed(NamedTuple):
-    """A scene over the mesh moved to the origin and scaled, and the mesh's hash when it was made."""
+    """A scene over the mesh moved to the origin and scaled, and the hash of that mesh."""
 
     mesh_hash: int
     scene: Scene
@@ -38,9 +40,8 @@ class _Placed(NamedTuple):
 class RayMeshIntersector:
     """Ray queries on a `trimesh.Trimesh`, with the methods of trimesh's own intersectors.
 
-    Coordinates go to `dtype` relative to the mesh's centre; directions are made unit vectors. Follows changes
-    of the mesh: its tree is built when first needed, and again once the mesh's hash has changed. Can be
-    pickled and copied.
+    Coordinates are converted to `dtype` relative to the mesh's centre, directions to unit vectors. The tree
+    is built when first needed, and again after the mesh's hash has changed. Can be pickled and copied.
     """
 
     def __init__(
@@ -59,12 +60,12 @@ class RayMeshIntersector:
         Arguments:
             geometry: the `trimesh.Trimesh`.
             scale_to_box: scale the mesh, by a power of two, to a size of about one.
-            backend, device, accuracy: of the `wive.Scene`.
-            threads: for each query; None is every core.
-            dtype: of the scene's numbers: np.float32, or np.float64 where detail is finer than 1e-7 of the
+            backend, device, accuracy: as for `wive.Scene`.
+            threads: how many each query uses; None is every core. For CPU backends.
+            dtype: of the scene's numbers: np.float32, or np.float64 if detail is finer than 1e-7 of the
                 mesh's size.
 
-        Raises TypeError where `geometry` is no such mesh. Queries raise what `wive.Scene` and its queries do.
+        Raises TypeError if `geometry` is no such mesh. Queries raise what `wive.Scene` and its queries raise.
         """
         missing = [name for name in ("vertices", "faces", "bounds") if not hasattr(geometry, name)]
         if missing:
@@ -97,11 +98,11 @@ class RayMeshIntersector:
         Arguments:
             ray_origins, ray_directions: (n,3) real numbers.
             multiple_hits: every hit along a ray, or the first only.
-            max_hits: the most hits a ray; None is all there are. (trimesh stops at 100.)
-            return_locations: return the points hit, too.
+            max_hits: the most hits per ray; None is all there are. (trimesh stops at 100.)
+            return_locations: whether to return the points hit.
 
         Returns (m,) int64 rows of `mesh.faces`, (m,) int64 rays, and (m,3) float64 points if asked for. As in
-        trimesh, all first hits come before all second ones, and so on, each by ascending ray.
+        trimesh, all first hits precede all second ones, and so on, each by ascending ray.
         """
         origins, directions = _rays(ray_origins, ray_directions)
         placed = self._place()
@@ -111,7 +112,7 @@ class RayMeshIntersector:
             ray = found.ray
             depth = np.arange(len(ray)) - found.offsets[ray]
             if len(ray) and depth.max() < 1 << 16:
-                depth = depth.astype(np.uint16)  # which NumPy sorts by radix
+                depth = depth.astype(np.uint16)  # NumPy sorts 16-bit integers by radix
             order = np.argsort(depth, kind="stable")
             if max_hits is not None:
                 order = order[: np.count_nonzero(depth < max_hits)]
@@ -138,7 +139,7 @@ class RayMeshIntersector:
         return points[0], rays, triangles
 
     def intersects_first(self, ray_origins: ArrayLike, ray_directions: ArrayLike) -> NDArray[np.int32]:
-        """(n,) int32 row of `mesh.faces` that each ray hits first, -1 where it hits nothing."""
+        """(n,) int32 row of `mesh.faces` that each ray hits first, -1 if it hits nothing."""
         placed = self._place()
         rays = _placed_rays(placed, *_rays(ray_origins, ray_directions))
         return placed.scene.intersect(*rays, threads=self._threads).prim
@@ -152,9 +153,9 @@ class RayMeshIntersector:
     def contains_points(self, points: ArrayLike) -> NDArray[np.bool_]:
         """(n,) bool: whether each point (n,3) lies inside the mesh, which must be closed.
 
-        A point is inside where rays both ways along a line pass the surface an odd number of times. Where the
-        two disagree, as they may at an edge, another line is asked. Points on the surface may come out either
-        way.
+        A point is inside if rays in both directions along a line pass the surface an odd number of times. If
+        the two disagree, as they may at an edge, another line is tried. Points on the surface may be inside
+        or not.
         """
         places = np.asarray(points, np.float64)
         if places.ndim != 2 or places.shape[1] != 3:
@@ -168,7 +169,7 @@ class RayMeshIntersector:
         for direction in DIRECTIONS:
             there = self._passes(placed, places[asked], np.array(direction))
             back = self._passes(placed, places[asked], -np.array(direction))
-            # One way out that meets nothing is a sure sign, whatever the other one says.
+            # A ray that meets nothing proves that the point is outside, whatever the other ray meets.
             free = (there == 0) | (back == 0)
             agreed = there % 2 == back % 2
             contained[asked] = (there % 2 == 1) & ~free
@@ -203,27 +204,27 @@ class RayMeshIntersector:
         origins: Float64,
         directions: Float64,
     ) -> Float64:
-        """(m,3) where rays meet the planes of the triangles they hit, in the mesh's own float64."""
+        """(m,3) points where rays meet the planes of the triangles they hit, in the mesh's own float64."""
         prim, uv, ray = hits
         vertices = np.ascontiguousarray(self.mesh.vertices, np.float64)
         return _cpu.points_on_rays(vertices, placed.scene.faces, prim, uv, ray, origins, directions)
 
     def __getstate__(self) -> dict[str, Any]:
-        """All but the tree, which is built again."""
+        """Everything but the tree, which is built again."""
         return {**self.__dict__, "_placed": None}
 
-    def __copy__(self) -> "RayMeshIntersector":
-        """Another one on the same mesh."""
+    def __copy__(self) -> RayMeshIntersector:
+        """Another intersector on the same mesh."""
         kept = {**self._options, "threads": self._threads, "dtype": self._real.dtype}
         return RayMeshIntersector(self.mesh, self._scale_to_box, **kept)
 
-    def __deepcopy__(self, memo: dict[int, Any]) -> "RayMeshIntersector":
-        """Another one on the same mesh, as trimesh's own."""
+    def __deepcopy__(self, memo: dict[int, Any]) -> RayMeshIntersector:
+        """Another intersector on the same mesh, as trimesh's own do."""
         return self.__copy__()
 
 
 def _rays(ray_origins: ArrayLike, ray_directions: ArrayLike) -> tuple[Float64, Float64]:
-    """Origins and unit directions, (n,3); NaN where a direction has no length."""
+    """Origins and unit directions, (n,3); NaN if a direction has no length."""
     origins = np.asarray(ray_origins, np.float64)
     directions = np.asarray(ray_directions, np.float64)
     if origins.shape != directions.shape or origins.ndim != 2 or origins.shape[1] != 3:
@@ -237,5 +238,5 @@ def _rays(ray_origins: ArrayLike, ray_directions: ArrayLike) -> tuple[Float64, F
 
 
 def _placed_rays(placed: _Placed, origins: Float64, directions: Float64) -> tuple[Float64, Float64]:
-    """The rays where the scene is."""
+    """The rays in the scene's coordinates."""
     return (origins - placed.origin) * placed.scale, directions

@@ -237,12 +237,6 @@ def test_a_scene_saved_elsewhere_needs_its_backend_here_unless_it_was_auto(monke
         ((ORIGINS, ORIGINS), {"threads": 1.5}, TypeError, "threads must be an integer, got float 1.5"),
         ((ORIGINS, ORIGINS), {"in_flight": -1}, ValueError, "in_flight must be from 1 to 2147483647, got -1"),
         ((ORIGINS, ORIGINS), {"lanes": 4}, ValueError, "lanes must be one of auto, 8, 1, got 4"),
-        (
-            (ORIGINS, ORIGINS),
-            {"lanes": 8},
-            ValueError,
-            "lanes is only for backend 'warp', got 8 on a CPU backend: leave it out",
-        ),
     ],
 )
 def test_bad_rays(query, rays, options, kind, expected):

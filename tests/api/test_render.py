@@ -103,10 +103,40 @@ def test_a_picture_is_the_same_on_any_backend_and_thread_count(usable_backends, 
     assert first.shape == (32, 48, 3)
     assert first.dtype == np.float32
     for name in usable_backends:
-        picture = wive.render(wive.Scene(*mesh, backend=name), albedo=albedo, threads=5, **SMALL)
+        options = {} if name == "warp" else {"threads": 5}
+        picture = wive.render(wive.Scene(*mesh, backend=name), albedo=albedo, **options, **SMALL)
         np.testing.assert_array_equal(picture, first)
     monkeypatch.setattr(wive.rendering, "BAND_PATHS", 1)
     np.testing.assert_array_equal(wive.render(wive.Scene(*mesh), albedo=albedo, **SMALL), first)
+
+
+def test_a_picture_checks_the_mesh_once(monkeypatch):
+    scene = wive.Scene(*sphere(2))
+    bvh, checks = scene._tracer.bvh, []
+
+    class Watched:
+        def __getattr__(self, name):
+            return getattr(bvh, name)
+
+        def render_rows(self, *arguments, check, **keywords):
+            checks.append(check)
+            return bvh.render_rows(*arguments, check=check, **keywords)
+
+    monkeypatch.setattr(scene._tracer, "bvh", Watched())
+    monkeypatch.setattr(wive.rendering, "BAND_PATHS", 1)
+    for _ in range(2):
+        checks.clear()
+        wive.render(scene, **SMALL)
+        assert checks == [True] + [False] * (len(checks) - 1)
+        assert len(checks) == SMALL["height"]
+
+
+def test_a_picture_of_a_mesh_that_was_changed_after_the_build_is_refused():
+    vertices, faces = sphere(2)
+    scene = wive.Scene(vertices, faces)
+    faces[7, 1] = len(vertices)
+    with pytest.raises(ValueError, match=r"faces\[7\]"):
+        wive.render(scene, **SMALL)
 
 
 def test_another_seed_is_another_picture_of_the_same_scene(backend):

@@ -105,7 +105,7 @@ def test_info_describes_mesh_and_tree(ball, capsys):
     assert lines["accuracy"] == "fast"
     assert int(lines["nodes"]) > 20
     assert 2 <= int(lines["depth"]) < 30
-    assert lines["memory"].endswith("a triangle)")
+    assert lines["memory"].endswith("per triangle)")
 
 
 def test_info_names_the_node_form(ball, capsys):

@@ -17,7 +17,7 @@ ARITHMETIC = re.compile(r"\b(?:add|sub|mul|fma|mad|div|rcp|sqrt|rsqrt)\.[a-z0-9.
 
 def modules() -> dict[str, tuple[wp.Module, tuple[str, ...]]]:
     """What is compiled together, and the kernels in it."""
-    found = {"shading": (wp.get_module(warp_shading.__name__), ("start_paths", "shade", "gather"))}
+    found = {"shading": (wp.get_module(warp_shading.__name__), ("start_paths", "shade", "accumulate"))}
     for precision in PRECISIONS:
         found[f"hits {precision}"] = (
             warp_hits.hit_kernels(precision).points.module,

@@ -1,121 +1,109 @@
-"""Hits on a Warp device: mask, points and normals are computed there."""
+"""Hits on a Warp device: what is not an array of theirs is computed there when used.
 
-# mypy: disable-error-code="untyped-decorator, valid-type, no-redef"
+`wive.hits.WrappedHits` and `wive.all_hits.WrappedAllHits` call these on the stream of the user's library.
+"""
 
-import functools
-from collections.abc import Callable
-from dataclasses import dataclass
-from types import SimpleNamespace
-from typing import Any
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
 
 import warp as wp
+from numpy.typing import ArrayLike
 
-from wive._internal.arguments import Float32, Int32
-from wive.warp_kernels.lanes.precision import PRECISIONS, precision_of
+from wive.all_hits import row_of
+from wive.warp_kernels.lanes.precision import PRECISIONS
+from wive.warp_kernels.scene.rays import WarpRays
+from wive.warp_kernels.scene.spawn import ACCURACIES, bounds_kernel, spawn_kernel
+from wive.warp_kernels.scene.surfaces import count_hits, hit_kernels, number_rays
 
-OPTIONS = {"enable_backward": False, "fuse_fp": False}
+if TYPE_CHECKING:
+    from wive.warp_kernels.scene.tracer import WarpTracer
 
 
-@dataclass(frozen=True, eq=False, repr=False)
 class WarpHits:
-    """What `wive.Hits` holds, as Warp arrays: t and prim (n,), uv (n,) vec2, or vec2d in a float64 scene.
+    """The arrays of `wive.Hits` as Warp's: t and prim (n,), uv (n,) vec2, or vec2d in a float64 scene."""
 
-    `mesh_on_device` gives vertices (v,) vec3 or vec3d and faces (f,) vec3i on the device of the hits.
-    """
-
-    t: Any
-    prim: Any
-    uv: Any
-    vertices: Float32
-    faces: Int32
-    mesh_on_device: Callable[[], tuple[Any, Any]]
-
-    @property
-    def _kernels(self) -> SimpleNamespace:
-        return hit_kernels(precision_of(self.t))
+    def __init__(self, tracer: WarpTracer, t: Any, prim: Any, uv: Any, rays: WarpRays | None = None) -> None:
+        """Keep the arrays; `rays` are for `error_bound`."""
+        self.t, self.prim, self.uv = t, prim, uv
+        self.vertices, self.faces = tracer.vertices, tracer.faces
+        self._tracer, self._rays = tracer, rays
 
     @property
     def mask(self) -> Any:
         """(n,) bool."""
-        mask = wp.empty(len(self.prim), dtype=wp.bool, device=self.prim.device)
-        wp.launch(self._kernels.mask, len(mask), [self.prim], [mask], device=mask.device)
-        return mask
+        return self._computed(hit_kernels(self._tracer.precision).mask, wp.bool, [self.prim])
 
     def points(self) -> Any:
         """(n,) vec3d."""
-        points = wp.empty(len(self.prim), dtype=wp.vec3d, device=self.prim.device)
-        inputs = [*self.mesh_on_device(), self.prim, self.uv]
-        wp.launch(self._kernels.points, len(points), inputs, [points], device=points.device)
-        return points
+        inputs = [*self._tracer.mesh, self.prim, self.uv]
+        return self._computed(hit_kernels(self._tracer.precision).points, wp.vec3d, inputs)
 
     def normals(self) -> Any:
         """(n,) vec3d."""
-        normals = wp.empty(len(self.prim), dtype=wp.vec3d, device=self.prim.device)
-        inputs = [*self.mesh_on_device(), self.prim]
-        wp.launch(self._kernels.normals, len(normals), inputs, [normals], device=normals.device)
-        return normals
+        inputs = [*self._tracer.mesh, self.prim]
+        return self._computed(hit_kernels(self._tracer.precision).normals, wp.vec3d, inputs)
+
+    @property
+    def error_bound(self) -> Any:
+        """(n,) float64."""
+        assert self._rays is not None
+        inputs = [*self._tracer.mesh, self.prim, self.t, self._rays.origins, self._rays.directions]
+        return self._computed(bounds_kernel(self._tracer.precision), wp.float64, inputs)
+
+    def spawn(self, directions: ArrayLike) -> Any:
+        """(n,) vec3, or vec3d in a float64 scene."""
+        precision, accuracy = self._tracer.precision, ACCURACIES.index(self._tracer.accuracy)
+        rows = self._tracer.loader.directions(directions, len(self.prim))
+        inputs = [*self._tracer.mesh, self.prim, self.uv, rows, accuracy]
+        return self._computed(spawn_kernel(precision), PRECISIONS[precision].vec3, inputs)
+
+    def __len__(self) -> int:
+        """Number of rays."""
+        return len(self.t)
+
+    def _computed(self, kernel: Any, dtype: Any, inputs: list[Any]) -> Any:
+        """What the kernel writes, one value per hit."""
+        output = wp.empty(len(self.prim), dtype=dtype, device=self.prim.device)
+        wp.launch(kernel, len(output), inputs, [output], device=output.device)
+        return output
 
 
-@wp.func
-def in_double(v: wp.vec3) -> wp.vec3d:
-    """The same vector."""
-    return wp.vec3d(wp.float64(v[0]), wp.float64(v[1]), wp.float64(v[2]))
+class WarpAllHits(WarpHits):
+    """The arrays of `wive.AllHits` as Warp's: offsets (n+1,) int64, t and prim (h,), uv (h,) vec2."""
+
+    def __init__(self, tracer: WarpTracer, offsets: Any, t: Any, prim: Any, uv: Any) -> None:
+        """Keep the arrays."""
+        super().__init__(tracer, t, prim, uv)
+        self.offsets = offsets
+
+    @property
+    def counts(self) -> Any:
+        """(n,) int32."""
+        counts = wp.empty(len(self), dtype=wp.int32, device=self.offsets.device)
+        wp.launch(count_hits, len(counts), [self.offsets], [counts], device=counts.device)
+        return counts
+
+    @property
+    def ray(self) -> Any:
+        """(h,) int64."""
+        ray = wp.empty(len(self.t), dtype=wp.int64, device=self.offsets.device)
+        wp.launch(number_rays, len(self), [self.offsets], [ray], device=ray.device)
+        return ray
+
+    def __len__(self) -> int:
+        """Number of rays."""
+        return len(self.offsets) - 1
+
+    def __getitem__(self, i: int) -> WarpAllHits:
+        """The hits of ray i; waits for the device."""
+        row = row_of(i, len(self))
+        first, last = (int(offset) for offset in self.offsets[row : row + 2].numpy())
+        offsets = wp.array([0, last - first], dtype=wp.int64, device=self.offsets.device)
+        rows = (_part(array, first, last) for array in (self.t, self.prim, self.uv))
+        return WarpAllHits(self._tracer, offsets, *rows)
 
 
-@wp.func
-def in_double(v: wp.vec3d) -> wp.vec3d:  # noqa: D103, F811
-    return v
-
-
-@functools.cache
-def hit_kernels(precision: str) -> SimpleNamespace:
-    """The kernels for scenes of that precision, compiled together."""
-    numbers = PRECISIONS[precision]
-    vec2, vec3 = numbers.vec2, numbers.vec3
-    module = wp.get_module(f"{__name__}.{precision}")
-    wp.set_module_options(OPTIONS, module=module)
-
-    @wp.kernel(module=module)
-    def mask(prim: wp.array[wp.int32], mask: wp.array[wp.bool]) -> None:
-        i = wp.tid()
-        mask[i] = prim[i] >= 0
-
-    @wp.kernel(module=module)
-    def points(
-        vertices: wp.array[vec3],
-        faces: wp.array[wp.vec3i],
-        prim: wp.array[wp.int32],
-        uv: wp.array[vec2],
-        points: wp.array[wp.vec3d],
-    ) -> None:
-        i = wp.tid()
-        if prim[i] < 0:
-            points[i] = wp.vec3d(wp.float64(wp.nan))
-            return
-        face = faces[prim[i]]
-        u = wp.float64(uv[i][0])
-        v = wp.float64(uv[i][1])
-        w = wp.float64(1.0) - u - v
-        points[i] = (
-            w * in_double(vertices[face[0]])
-            + u * in_double(vertices[face[1]])
-            + v * in_double(vertices[face[2]])
-        )
-
-    @wp.kernel(module=module)
-    def normals(
-        vertices: wp.array[vec3],
-        faces: wp.array[wp.vec3i],
-        prim: wp.array[wp.int32],
-        normals: wp.array[wp.vec3d],
-    ) -> None:
-        i = wp.tid()
-        if prim[i] < 0:
-            normals[i] = wp.vec3d(wp.float64(wp.nan))
-            return
-        face = faces[prim[i]]
-        v0 = in_double(vertices[face[0]])
-        across = wp.cross(in_double(vertices[face[1]]) - v0, in_double(vertices[face[2]]) - v0)
-        normals[i] = across / wp.length(across)
-
-    return SimpleNamespace(mask=mask, points=points, normals=normals)
+def _part(array: Any, first: int, last: int) -> Any:
+    """Rows of an array, over the same memory; Warp refuses slices of no rows."""
+    return array[first:last] if last > first else wp.empty(0, dtype=array.dtype, device=array.device)

@@ -1,4 +1,4 @@
-"""Rays as Warp arrays on the scene's device: checked, and shared with their owner rather than copied."""
+"""Rays as Warp arrays on the scene's device: checked, and sharing memory with the user's arrays."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -7,12 +7,12 @@ import numpy as np
 import warp as wp
 
 from wive._internal import arguments
-from wive._internal.arrays import NUMPY, library_of
+from wive._internal.arrays import NUMPY, Library, library_of, lies_on
 from wive._internal.precision import Floats, real_named
 from wive._internal.rays import Rays
 from wive.warp_kernels.lanes.precision import PRECISIONS, precision_of
 
-# Limits that nearly every call has: made once for a scene, they cost a call nothing.
+# Limits that nearly every query has, made once per scene.
 COMMON_LIMITS = (0.0, float("inf"))
 
 
@@ -20,7 +20,7 @@ COMMON_LIMITS = (0.0, float("inf"))
 class WarpRays:
     """Origins and directions (n,) vec3, tmin and tmax (1,) or (n,) float32, on one device.
 
-    For a float64 scene vec3d and float64.
+    A float64 scene has vec3d and float64.
     """
 
     origins: Any
@@ -46,7 +46,7 @@ class RayLoader:
         self._common = {value: wp.full(1, value, dtype=self._real, device=device) for value in COMMON_LIMITS}
 
     def from_numpy(self, rays: Rays) -> WarpRays:
-        """Checked as for every backend; copied only where the device is not the host."""
+        """Rays checked as for every backend; copied only if the device is not the host."""
         origins, directions, tmin, tmax = rays.numpy(self._dtype)
         return WarpRays(
             wp.array(origins, dtype=self._vec3, device=self.device, copy=False),
@@ -56,9 +56,10 @@ class RayLoader:
         )
 
     def from_device(self, rays: Rays) -> WarpRays:
-        """Arrays on this device, of the scene's type as they are; nothing of them goes through the host."""
-        origins, one_origin = self._vectors("origins", rays.origins)
-        directions, one_direction = self._vectors("directions", rays.directions)
+        """Arrays on this device and of the scene's type already; none of them goes through the host."""
+        of_origins, of_directions, of_tmin, of_tmax = rays.libraries
+        origins, one_origin = self._vectors("origins", rays.origins, of_origins)
+        directions, one_direction = self._vectors("directions", rays.directions, of_directions)
         count = len(directions) if one_origin else len(origins)
         if not one_direction and len(directions) != count:
             raise ValueError(
@@ -67,8 +68,8 @@ class RayLoader:
         return WarpRays(
             _view(origins, count, 0) if one_origin else origins,
             _view(directions, count, 0) if one_direction else directions,
-            self._limit("tmin", rays.tmin, count),
-            self._limit("tmax", rays.tmax, count),
+            self._limit("tmin", rays.tmin, of_tmin, count),
+            self._limit("tmax", rays.tmax, of_tmax, count),
         )
 
     def directions(self, value: Any, count: int) -> Any:
@@ -81,12 +82,12 @@ class RayLoader:
                 return _view(one, count, 0)
             return wp.array(rows, dtype=self._vec3, device=self.device, copy=False)
         place = library.device(value)
-        if place not in (self.device, None if self.device != "cpu" else self.device):
+        if not lies_on(place, self.device):
             raise ValueError(
-                f"directions must be on the device of the hits, {self.device}, got an array on {place}: "
-                "copy it there"
+                f"directions must be on the device of the hits, {self.device}, "
+                f"got an array on {place or 'a CUDA device'}: copy it there"
             )
-        array, shared = self._vectors("directions", value)
+        array, shared = self._vectors("directions", value, library)
         if shared:
             return _view(array, count, 0)
         if len(array) != count:
@@ -95,12 +96,11 @@ class RayLoader:
             )
         return array
 
-    def _vectors(self, name: str, value: Any) -> tuple[Any, bool]:
+    def _vectors(self, name: str, value: Any, library: Library) -> tuple[Any, bool]:
         """(n,) vec3 and False, or the (1,) that all rays share and True."""
-        library = library_of(value)
         if library is NUMPY:
             return wp.full(1, self._vec3(*map(float, value)), dtype=self._vec3, device=self.device), True
-        array = self._checked(name, value)
+        array = self._checked(name, value, library)
         if array.dtype is self._vec3 and array.ndim == 1:
             return array, False
         if array.dtype is self._vec3 or array.ndim not in (1, 2) or array.shape[-1] != 3:
@@ -112,14 +112,14 @@ class RayLoader:
             return _view(rows, 1, 0), True
         return _view(rows, len(rows), rows.strides[0]), False
 
-    def _limit(self, name: str, value: Any, count: int) -> Any:
+    def _limit(self, name: str, value: Any, library: Library, count: int) -> Any:
         """(1,) or (count,) float32."""
         if type(value) is float and value in self._common:
             return self._common[value]
-        if library_of(value) is NUMPY:
+        if library is NUMPY:
             (number,) = arguments.limits(name, value, 1, self._dtype)
             return self._limit_of_numpy(np.array([number], self.precision))
-        array = self._checked(name, value)
+        array = self._checked(name, value, library)
         if array.shape not in ((1,), (count,)) or array.dtype is not self._real:
             raise ValueError(
                 f"{name} must be one number or have shape ({count},), one a ray, got shape {_shape(array)}"
@@ -133,16 +133,16 @@ class RayLoader:
             return wp.full(1, float(values[0]), dtype=self._real, device=self.device)
         return wp.array(values, dtype=self._real, device=self.device, copy=False)
 
-    def _checked(self, name: str, value: Any) -> Any:
+    def _checked(self, name: str, value: Any, library: Library) -> Any:
         """The array as Warp's: of the scene's numbers or of vectors of three."""
         found: object = getattr(value, "dtype", "another type")
         try:
-            array = library_of(value).to_warp(value, self.device)
+            array = library.to_warp(value, self.device)
             if array.dtype in (self._vec3, self._real):
                 return array
             found = wp.types.type_repr(array.dtype)
         except (RuntimeError, TypeError, ValueError, BufferError):
-            pass  # a type that Warp has no name for: `found` is what its owner calls it
+            pass  # a type that Warp has no name for: `found` is its library's name
         raise TypeError(
             f"{name} must be {self.precision} on a Warp device, where nothing is converted, got {found}: "
             "convert it first"
@@ -164,5 +164,5 @@ def _view(array: Any, count: int, stride: int) -> Any:
 
 
 def _shape(array: Any) -> tuple[int, ...]:
-    """As its owner sees it: vectors are rows."""
+    """The shape in the user's library: vectors are rows."""
     return (*array.shape, *getattr(array.dtype, "_shape_", ()))

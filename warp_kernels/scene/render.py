@@ -1,16 +1,16 @@
 """Path tracing on a Warp device: the picture of render.cpp, bit for bit, whole wavefronts at a time.
 
-Random numbers come from (pixel, sample, bounce) alone and a pixel's light is added up in a fixed order, so it
-does not matter which device traces, nor in what order paths survive.
+Random numbers come from (pixel, sample, bounce) alone and a pixel's light is added up in a fixed order, so
+neither the device nor the order in which paths survive matters.
 """
 
 from collections.abc import Iterator
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 import warp as wp
 
-from wive._internal.arguments import Float32
+from wive.rendering import Image, Settings
 from wive.warp_kernels import check, launch_closest
 from wive.warp_kernels.scene import shading as warp_shading
 from wive.warp_kernels.scene.tracer import WarpTracer, choose_lanes
@@ -18,33 +18,24 @@ from wive.warp_kernels.scene.tracer import WarpTracer, choose_lanes
 # The tile and the wave of cpu/render/render.cpp: they say in which order a pixel's light is added up.
 TILE_WIDTH = 32
 WAVE_SIZE = 4096
-# Paths traced together: what fills a GPU, and some hundred megabytes of it.
+# Paths traced together: enough to fill a GPU, in some hundred megabytes of its memory.
 MOST_PATHS = 1 << 20
 
 
 class PictureRenderer:
-    """Renders one picture band by band; what a band leaves behind in memory serves the next."""
+    """Renders one picture band by band; bands share the arrays of their paths."""
 
-    def __init__(
-        self,
-        tracer: WarpTracer,
-        camera: Float32,
-        image: Float32,
-        samples: int,
-        bounces: int,
-        albedo: Literal["gray", "normals"],
-        seed: int,
-    ) -> None:
-        """Arguments as for the core's `render_rows`; image (height,width,3) is written in place."""
+    def __init__(self, tracer: WarpTracer, camera: Image, image: Image, settings: Settings) -> None:
+        """Take the camera's vectors (4,3) of `Camera.frame`; image (height,width,3) is written in place."""
         self._image = image
-        self._samples = samples
+        self._samples = settings.spp
         self._tracer = tracer
-        self._paths = _Paths(tracer, bounces, albedo == "normals")
+        self._paths = _Paths(tracer, settings.bounces, settings.albedo == "normals")
         self._frame = warp_shading.Frame()
         vectors = [wp.vec3(*map(float, vector)) for vector in camera]
         self._frame.eye, self._frame.centre, self._frame.right, self._frame.up = vectors
         self._frame.height, self._frame.width = image.shape[:2]
-        self._frame.seed = seed
+        self._frame.seed = settings.seed
 
     def render_rows(self, begin: int, end: int) -> int:
         """Path-trace rows [begin, end) of the image; returns the rays traced."""
@@ -70,7 +61,7 @@ class PictureRenderer:
 
 
 def _strips(width: int) -> Iterator[tuple[range, int]]:
-    """Columns rendered together, and how many samples of a pixel they add up at a time, as the CPU does."""
+    """Columns rendered together, and how many samples of a pixel are added up at a time, as on the CPU."""
     whole = width // TILE_WIDTH * TILE_WIDTH
     most = MOST_PATHS // WAVE_SIZE * TILE_WIDTH
     for begin in range(0, whole, most):
@@ -80,7 +71,7 @@ def _strips(width: int) -> Iterator[tuple[range, int]]:
 
 
 class _Paths:
-    """The state of all paths of a pass, reused by the next."""
+    """The state of all paths of a pass; the next pass reuses its arrays."""
 
     def __init__(self, tracer: WarpTracer, bounces: int, coloured: bool) -> None:
         self.tracer = tracer
@@ -106,7 +97,7 @@ class _Paths:
         self.next_wave = array(wp.int32), array(wp.vec3), array(wp.vec3)
 
     def trace(self, frame: warp_shading.Frame, pixels: int, sums: Any) -> int:
-        """All samples of a pass: their light into `sums`; returns the rays traced."""
+        """Add the light of all samples of a pass to `sums`; returns the rays traced."""
         device = self.tracer.device
         count = pixels * frame.samples
         self.reserve(count)
@@ -121,11 +112,11 @@ class _Paths:
             count = int(self.alive.numpy()[0])
             bounce += 1
         light = [frame, bounce, self.throughput, self.last_bounce]
-        wp.launch(warp_shading.gather, pixels, light, [sums], device=device)
+        wp.launch(warp_shading.accumulate, pixels, light, [sums], device=device)
         return rays
 
     def _bounce(self, frame: warp_shading.Frame, bounce: int, count: int) -> None:
-        """Trace the wave's first `count` rays; what bounces makes the next wave."""
+        """Trace the wave's first `count` rays; those that bounce make the next wave."""
         device = self.tracer.device
         path, origins, directions = self.wave
         launch_closest(
@@ -140,7 +131,7 @@ class _Paths:
             lanes=choose_lanes(None, count, device != "cpu"),
         )
         self.alive.zero_()
-        inputs = [frame, bounce, self.bounces, self.coloured, *self.tracer.mesh()]
+        inputs = [frame, bounce, self.bounces, self.coloured, *self.tracer.mesh]
         hits = [self.prim, self.uv, path, directions]
         outputs = [self.throughput, self.last_bounce, self.alive, *self.next_wave]
         wp.launch(warp_shading.shade, count, [*inputs, *hits], outputs, device=device)

@@ -1,6 +1,6 @@
 """The path tracer's kernels on Warp: operation by operation those of render.cpp, so that pictures agree.
 
-Every float operation is rounded on its own here as there: no fused multiply-adds, no reordering.
+In both, every float operation is rounded on its own: no fused multiply-adds, no reordering.
 """
 
 # mypy: disable-error-code="untyped-decorator"
@@ -27,7 +27,7 @@ LEAVE = wp.constant(wp.float32(2.0**-18))
 
 @wp.struct
 class Frame:
-    """The camera's vectors, the picture's size, and what of it one pass renders."""
+    """The camera's vectors, the picture's size, and the part of the picture that one pass renders."""
 
     eye: wp.vec3
     centre: wp.vec3
@@ -35,12 +35,12 @@ class Frame:
     up: wp.vec3
     width: wp.int32
     height: wp.int32
-    band_row: wp.int32  # where the array of sums begins
+    band_row: wp.int32  # the row of the first sum
     first_row: wp.int32
     first_column: wp.int32
     columns: wp.int32
     first_sample: wp.int32
-    samples: wp.int32  # of each pixel in this pass
+    samples: wp.int32  # per pixel in this pass
     seed: wp.uint32
 
 
@@ -83,7 +83,7 @@ def _in_double(a: wp.vec3) -> wp.vec3d:
 
 @wp.func
 def _unit_normal(a: wp.vec3, b: wp.vec3, c: wp.vec3) -> wp.vec3:
-    """In double, where neither tiny nor huge triangles lose their normal."""
+    """The unit normal, computed in double: in float, tiny and huge triangles would lose it."""
     u = _in_double(b) - _in_double(a)
     v = _in_double(c) - _in_double(a)
     x = u[1] * v[2] - u[2] * v[1]
@@ -142,7 +142,7 @@ def start_paths(
     origins: wp.array[wp.vec3],
     directions: wp.array[wp.vec3],
 ) -> None:
-    """One camera ray per path: all samples of a pixel, then those of the next."""
+    """Write one camera ray per path: all samples of a pixel, then those of the next pixel."""
     i = wp.tid()
     pixel = i // frame.samples
     row = frame.first_row + pixel // frame.columns
@@ -179,7 +179,7 @@ def shade(
     next_origins: wp.array[wp.vec3],
     next_directions: wp.array[wp.vec3],
 ) -> None:
-    """Paths that escape are marked with their bounce; the others bounce, until they have bounced enough."""
+    """Mark paths that escape with their bounce; the others bounce, at most `bounces` times."""
     i = wp.tid()
     own = path[i]
     if prim[i] < 0:
@@ -211,14 +211,14 @@ def shade(
 
 
 @wp.kernel
-def gather(
+def accumulate(
     frame: Frame,
     depth: wp.int32,
     throughput: wp.array[wp.vec3],
     last_bounce: wp.array[wp.int32],
     sums: wp.array[wp.vec3],
 ) -> None:
-    """The sky's light that a pixel's paths bring home, added by bounce and sample as render.cpp does."""
+    """Add the sky's light along a pixel's escaped paths, by bounce and sample as render.cpp does."""
     i = wp.tid()
     row = frame.first_row - frame.band_row + i // frame.columns
     pixel = row * frame.width + frame.first_column + i % frame.columns

@@ -6,17 +6,14 @@ Operation by operation as wive/error_bounds.py and wive/spawn.py, where the reas
 # mypy: disable-error-code="untyped-decorator, valid-type, no-redef"
 
 import functools
-from dataclasses import dataclass
 from typing import Any
 
 import warp as wp
-from numpy.typing import ArrayLike
 
 from wive._internal import error_bounds, spawn
-from wive.warp_kernels.lanes.precision import PRECISIONS, precision_of
+from wive.warp_kernels.lanes.precision import PRECISIONS
 from wive.warp_kernels.queries.frame import powers_of
-from wive.warp_kernels.scene.hits import OPTIONS, WarpHits, in_double
-from wive.warp_kernels.scene.rays import RayLoader, WarpRays
+from wive.warp_kernels.scene.surfaces import OPTIONS, in_double
 
 ERROR = wp.constant(wp.float64(error_bounds.ROUNDINGS * error_bounds.UNIT_ROUNDOFF))
 ROUND_UP = wp.constant(wp.float64(1 + 8 * error_bounds.UNIT_ROUNDOFF))
@@ -26,35 +23,6 @@ MARGIN = wp.constant(wp.float64(spawn.MARGIN))
 
 ACCURACIES = tuple(spawn.CLEARANCES)
 FAST, WATERTIGHT = (wp.constant(ACCURACIES.index(name)) for name in ("fast", "watertight"))
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class WarpClosestHits(WarpHits):
-    """What `wive.Hits` holds, as Warp arrays, with the rays and the accuracy of the scene."""
-
-    rays: WarpRays
-    accuracy: str
-
-    @property
-    def error_bound(self) -> Any:
-        """(n,) float64."""
-        bounds = wp.empty(len(self.prim), dtype=wp.float64, device=self.prim.device)
-        rays = [self.rays.origins, self.rays.directions]
-        inputs = [*self.mesh_on_device(), self.prim, self.t, *rays]
-        kernel = bounds_kernel(precision_of(self.t))
-        wp.launch(kernel, len(bounds), inputs, [bounds], device=bounds.device)
-        return bounds
-
-    def spawn(self, directions: ArrayLike) -> Any:
-        """(n,) vec3, or vec3d in a float64 scene."""
-        precision = precision_of(self.t)
-        loader = RayLoader(self.prim.device.alias, precision)
-        rows = loader.directions(directions, len(self.prim))
-        origins = wp.empty(len(self.prim), dtype=PRECISIONS[precision].vec3, device=self.prim.device)
-        accuracy = ACCURACIES.index(self.accuracy)
-        inputs = [*self.mesh_on_device(), self.prim, self.uv, rows, accuracy]
-        wp.launch(spawn_kernel(precision), len(origins), inputs, [origins], device=origins.device)
-        return origins
 
 
 def _module(precision: str) -> Any:

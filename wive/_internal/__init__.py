@@ -1,1 +1,1 @@
-"""What wive uses itself: not for import by others, and free to change."""
+"""Internals of wive: not for import by others, and free to change."""

@@ -1,21 +1,59 @@
 """Checks on what users pass. Every error is one line: the argument, what was expected, what came."""
 
+from __future__ import annotations
+
 import operator
 from collections.abc import Iterable, Sequence
-from typing import Any, Literal, TypeGuard
+from typing import Any, Literal, NamedTuple, TypedDict, TypeGuard
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from wive._internal.precision import FLOAT32, FLOAT64, Floats, Real, float32_or_refused, real_of
 
+Given = ArrayLike  # what users pass, by a name short enough for overloads
 Float32 = NDArray[np.float32]
 Int32 = NDArray[np.int32]
 Lanes = Literal[1, 8]
+LanesOption = Literal["auto", 8, 1]
 
+# The options that not every backend has, and which backends have them.
+HAVE_OPTION = {"threads": "CPU backends", "in_flight": "CPU backends", "lanes": "backend 'warp'"}
 # More threads than this only cost memory; the core takes 32-bit counts.
 MOST_THREADS = 4096
 MOST_COUNT = 2**31 - 1
+
+
+class QueryOptions(TypedDict, total=False):
+    """The options of a query as users give them."""
+
+    threads: int | None
+    in_flight: int | None
+    lanes: LanesOption
+
+
+class Plain(QueryOptions, total=False):
+    """The options of a query that returns no counters."""
+
+    stats: Literal[False]
+
+
+class Counted(QueryOptions):
+    """The options of a query that returns counters."""
+
+    stats: Literal[True]
+
+
+class Work(NamedTuple):
+    """The options of a query, checked."""
+
+    threads: int = 0  # 0 is every core
+    in_flight: int = 0  # 0 leaves it to the core
+    lanes: Lanes | None = None  # None leaves it to the Warp backend
+    stats: bool = False
+
+
+USUAL_WORK, WITH_STATS = Work(), Work(stats=True)
 
 
 def choice(name: str, value: object, allowed: Iterable[str]) -> None:
@@ -82,7 +120,7 @@ def mesh(vertices: ArrayLike, faces: ArrayLike, accuracy: str = "watertight") ->
 
 
 def moved_vertices(vertices: ArrayLike, count: int, real: Real) -> Floats:
-    """New positions (count,3) in the scene's dtype, C-contiguous; an array that is so is not copied."""
+    """New positions (count,3) in the scene's dtype, C-contiguous; not copied if they are so already."""
     points = _positions(vertices)
     if len(points) != count:
         raise ValueError(
@@ -93,7 +131,7 @@ def moved_vertices(vertices: ArrayLike, count: int, real: Real) -> Floats:
 
 
 def read_only(array: NDArray[Any]) -> NDArray[Any]:
-    """The same array, which can't be written to through this view."""
+    """A view of the array that can't be written to."""
     view = array.view(np.ndarray)
     view.flags.writeable = False
     return view
@@ -104,7 +142,7 @@ def rays(
 ) -> tuple[Floats, Floats, Floats, Floats]:
     """Origins and directions (n,3), tmin and tmax (1,) or (n,), all C-contiguous and of `real`'s dtype.
 
-    A vector of shape (3,) is that of every ray.
+    A vector of shape (3,) is shared by all rays.
     """
     dtype = real.dtype
     origin_rows = origins if _is_ready(origins, dtype) else _vectors("origins", origins, real)
@@ -120,7 +158,7 @@ def rays(
         raise ValueError(
             f"origins and directions must be equally many, got {count} and {len(direction_rows)}"
         )
-    common = real.limits  # looked up here, as a call of one ray spends most of its time in calls
+    common = real.limits  # looked up here: a query of one ray spends most of its time in calls
     low = common[tmin] if type(tmin) is float and tmin in common else limits("tmin", tmin, count, real)
     high = common[tmax] if type(tmax) is float and tmax in common else limits("tmax", tmax, count, real)
     return origin_rows, direction_rows, low, high
@@ -137,7 +175,7 @@ def directions(value: ArrayLike, count: int, real: Real = FLOAT32) -> Floats:
 
 
 def threads(value: int | None) -> int:
-    """The number of threads to use; 0 is one for each core that this process may run on."""
+    """The number of threads to use; 0 is one per core that this process may run on."""
     if value is None:
         return 0
     return min(integer("threads", value, 1), MOST_THREADS)
@@ -148,21 +186,40 @@ def in_flight(value: int | None) -> int:
     return 0 if value is None else integer("in_flight", value, 1)
 
 
-def work(asked_threads: int | None, asked_in_flight: int | None, stats: bool) -> tuple[int, int, bool]:
-    """How the core is to trace: threads, rays in flight, whether to count."""
-    if asked_threads is None and asked_in_flight is None:
-        return 0, 0, bool(stats)
-    return threads(asked_threads), in_flight(asked_in_flight), bool(stats)
+def work(
+    backend: str,
+    allowed: frozenset[str],
+    asked_threads: int | None,
+    asked_in_flight: int | None,
+    asked_lanes: object,
+    stats: bool,
+) -> Work:
+    """The options of a query, checked; ValueError for one that only other backends have."""
+    if asked_threads is None and asked_in_flight is None and asked_lanes == "auto":
+        return WITH_STATS if stats else USUAL_WORK
+    checked = Work(threads(asked_threads), in_flight(asked_in_flight), lanes(asked_lanes), bool(stats))
+    refuse_others_options(
+        backend, allowed, threads=asked_threads, in_flight=asked_in_flight, lanes=checked.lanes
+    )
+    return checked
 
 
-def lanes(value: object, on_warp: bool) -> Lanes | None:
-    """8 or 1 lanes of a node a thread; None is "auto"."""
+def refuse_others_options(backend: str, allowed: frozenset[str], **given: object) -> None:
+    """Raise ValueError for an option that is given (not None) and that this backend doesn't have."""
+    for name, value in given.items():
+        if value is not None and name not in allowed:
+            raise ValueError(
+                f"{name} is only for {HAVE_OPTION[name]}, got {value!r} with backend {backend!r}: "
+                "leave it out"
+            )
+
+
+def lanes(value: object) -> Lanes | None:
+    """8 or 1 lanes of a node per thread; None is "auto"."""
     if value not in ("auto", 8, 1) or isinstance(value, bool):
         raise ValueError(f"lanes must be one of auto, 8, 1, got {value!r}")
     if value == "auto":
         return None
-    if not on_warp:
-        raise ValueError(f"lanes is only for backend 'warp', got {value!r} on a CPU backend: leave it out")
     return 8 if value == 8 else 1
 
 
@@ -177,7 +234,7 @@ def limits(name: str, value: ArrayLike, count: int, real: Real = FLOAT32) -> Flo
 
 
 def _is_ready(value: ArrayLike, dtype: np.dtype[Any]) -> TypeGuard[Floats]:
-    """Whether it is an (n,3) array as the core takes it: checks are most of a small call."""
+    """Whether `value` is an (n,3) array as the core takes it; quick, as checks are most of a small query."""
     return (
         type(value) is np.ndarray
         and value.dtype is dtype

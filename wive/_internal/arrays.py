@@ -248,6 +248,11 @@ def library_of(value: Any) -> Library:
     return NUMPY
 
 
+def lies_on(place: str | None, device: str) -> bool:
+    """Whether an array at `place` may lie on `device`; None, a place not told, is some CUDA device."""
+    return device != "cpu" if place is None else place == device
+
+
 def host_array(name: str, value: Any) -> Any:
     """`value` as an array that NumPy can read; ValueError where it is not in host memory."""
     library = library_of(value)

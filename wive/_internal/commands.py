@@ -1,4 +1,4 @@
-"""What each command of the command line does, given its parsed options."""
+"""The commands of the command line, given their parsed options."""
 
 import time
 from argparse import Namespace
@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wive._internal.arguments import rays as checked_rays
+from wive._internal.arguments import refuse_others_options
 from wive._internal.files import atomic_write, check_output
 from wive._internal.npzfile import check_input, read_npy_or_npz
 from wive._internal.precision import Floats, Real, real_named
@@ -41,10 +42,11 @@ def render_picture(options: Namespace) -> None:
 
 
 def trace_rays(options: Namespace) -> None:
-    """`wive trace`: closest hits, or all, of a file of rays into an npz file."""
+    """`wive trace`: write the closest hits, or all, of a file of rays to an npz file."""
     output = check_output(options.output, ".npz")
     check_input(options.rays)
     scene = _scene(options, *load_mesh(options.mesh, options.precision))
+    refuse_others_options(scene.backend, scene._tracer.options, threads=options.threads)
     origins, directions, tmin, tmax = _read_rays(options.rays, real_named(options.precision))
     count = len(origins)
     query = scene.intersect_all if options.all else scene.intersect
@@ -99,7 +101,7 @@ def describe_mesh(options: Namespace) -> None:
             "SAH cost",
             f"{node_cost + triangle_cost:.2f} ({node_cost:.2f} nodes, {triangle_cost:.2f} triangles)",
         ),
-        ("memory", f"{scene.memory:,} bytes ({scene.memory / len(scene):.1f} a triangle)"),
+        ("memory", f"{scene.memory:,} bytes ({scene.memory / len(scene):.1f} per triangle)"),
         ("build", f"{seconds:.3f} s"),
     ):
         print(f"{name:<10} {value}")
@@ -135,7 +137,7 @@ def _tracer(scene: Scene) -> str:
 
 
 def _camera(options: Namespace, scene: Scene) -> Camera:
-    """The camera that the options describe; what they leave open comes from the automatic one."""
+    """The camera that the options describe; the automatic camera fills in what they leave open."""
     fov = {} if options.fov is None else {"fov": options.fov}
     if options.mesh is None:
         camera = terrain_camera()
@@ -150,7 +152,7 @@ def _camera(options: Namespace, scene: Scene) -> Camera:
 
 
 def _read_rays(name: str, real: Real) -> tuple[Floats, ...]:
-    """Origins, directions, tmin and tmax as `Scene.intersect` uses them."""
+    """Origins, directions, tmin and tmax, in the form that the core takes."""
     expected = "a file of rays, (n,6) or (n,8) in an .npy or `origins` and `directions` in an .npz"
     loaded = read_npy_or_npz(name, expected)
     if isinstance(loaded, dict):

@@ -1,16 +1,14 @@
-"""Warp's devices: which there are, and what stands in the way of those that there are not.
+"""Warp's devices: which there are, and why the others can't be used.
 
-Nothing here imports Warp before somebody asks for one of its devices.
+Warp is imported when its devices are first listed, not before.
 """
 
 import contextlib
 import functools
 import importlib
-import importlib.metadata
 import importlib.util
 import os
 import sys
-import tempfile
 from collections.abc import Iterator
 from types import ModuleType
 from typing import Any
@@ -24,7 +22,9 @@ NO_GPU = "the NVIDIA driver shows no GPU: look at nvidia-smi and CUDA_VISIBLE_DE
 
 
 def warp_problem() -> str:
-    """Why Warp can't be used here, and how to mend it; empty where it can."""
+    """Why Warp can't be used here, and how to mend it; empty if it can."""
+    import importlib.metadata  # here, as it doubles the time that `import wive` takes
+
     if importlib.util.find_spec("warp") is None:
         return NO_WARP
     try:
@@ -39,7 +39,7 @@ def warp_problem() -> str:
 
 @functools.cache
 def warp_devices() -> dict[str, str]:
-    """Each Warp device by name with the reason it can't be used, empty where it can; "cpu" comes last."""
+    """Each Warp device by name with the reason it can't be used, empty if it can; "cpu" comes last."""
     wp = _start_warp()
     devices = {device.alias: _cuda_problem(wp, device) for device in wp.get_cuda_devices()}
     if not devices:
@@ -50,7 +50,7 @@ def warp_devices() -> dict[str, str]:
 def resolve_device(name: str | None) -> str:
     """The usable Warp device meant by `name`; None is the first usable one, "cuda" the first CUDA device.
 
-    Raises ValueError where there is no such device or it can't be used.
+    Raises ValueError if there is no such device or it can't be used.
     """
     found = warp_devices()
     usable = [device for device, reason in found.items() if not reason]
@@ -67,7 +67,9 @@ def resolve_device(name: str | None) -> str:
 
 
 def _start_warp() -> ModuleType:
-    """Warp, started without messages about itself; that there is no driver is for `warp_devices` to say."""
+    """Warp, started without messages about itself; `warp_devices` reports a missing driver."""
+    import tempfile
+
     from wive.warp_kernels.tree.quiet import hush
 
     wp = importlib.import_module("warp")

@@ -1,7 +1,6 @@
 """Output files that are whole or absent."""
 
 import os
-import secrets
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import BinaryIO
@@ -12,7 +11,7 @@ PathLike = str | os.PathLike[str]
 def check_output(path: PathLike, suffix: str = "") -> str:
     """Raise ValueError or OSError if `path` can't become a file that ends in `suffix`; return it as text.
 
-    Call it before long work whose result goes there.
+    Call it before long work whose result is written there.
     """
     name = os.fspath(path)
     if not name.lower().endswith(suffix):
@@ -31,7 +30,7 @@ def check_output(path: PathLike, suffix: str = "") -> str:
 def atomic_write(path: PathLike) -> Iterator[BinaryIO]:
     """An open binary file that becomes `path` when the block ends, and vanishes if it raises."""
     final = os.path.realpath(check_output(path))
-    part = f"{final}.{secrets.token_hex(4)}.part"
+    part = f"{final}.{os.urandom(4).hex()}.part"
     try:
         with open(part, "xb") as file:
             yield file

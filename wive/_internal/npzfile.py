@@ -1,4 +1,4 @@
-"""Reading NumPy's own files without trusting them."""
+"""NumPy's own files, read without trusting them."""
 
 import os
 from typing import Any
@@ -42,7 +42,5 @@ def _load(path: PathLike, expected: str) -> NDArray[Any] | dict[str, NDArray[Any
             return loaded if isinstance(loaded, np.ndarray) else dict(loaded)
     except MemoryError:
         raise
-    except (
-        Exception
-    ):  # what NumPy raises on damaged bytes is open-ended: tokenizer and zip errors among others
+    except Exception:  # NumPy raises anything on damaged bytes: tokenizer and zip errors among others
         raise ValueError(f"{name}: not {expected}, or damaged") from None

@@ -1,4 +1,4 @@
-"""A progress bar on stderr, by tqdm where it is installed."""
+"""A progress bar on stderr, by tqdm if it is installed."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -8,7 +8,7 @@ from contextlib import contextmanager
 def progress_bar(
     total: int, unit: str, title: str, *, show: bool = True
 ) -> Iterator[Callable[[int], object]]:
-    """Show a bar while the block runs; what it yields advances it by a number of units.
+    """Show a bar while the block runs; the function it yields advances it by a number of units.
 
     Without tqdm (extra `render`) the work goes on with no bar.
     """

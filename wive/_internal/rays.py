@@ -1,37 +1,37 @@
-"""The rays of one call: which library's arrays they are, and whether they lie where the scene traces."""
+"""The rays of one query: which libraries' arrays they are, and whether they lie where the scene traces."""
 
-from collections.abc import Mapping
+from __future__ import annotations
+
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from wive._internal import arguments
-from wive._internal.arrays import NUMPY, NUMPY_TYPES, Library, WarpArrays, library_of
-from wive._internal.precision import FLOAT32, Real
+from wive._internal.arrays import NUMPY, NUMPY_TYPES, Library, WarpArrays, library_of, lies_on
+from wive._internal.precision import FLOAT32, Floats, Real
 
-FourArrays = tuple[NDArray[Any], NDArray[Any], NDArray[Any], NDArray[Any]]
+NAMES = ("origins", "directions", "tmin", "tmax")
+Libraries = tuple[Library, Library, Library, Library]
 
 
 class Rays(NamedTuple):
-    """What a query was given, unconverted, and the library that its answer belongs to."""
+    """What a query was given, unconverted, the library of its answer, and the library of each array."""
 
     origins: Any
     directions: Any
     tmin: Any
     tmax: Any
     library: Library
+    libraries: Libraries = (NUMPY, NUMPY, NUMPY, NUMPY)
 
-    def numpy(self, real: Real = FLOAT32) -> FourArrays:
-        """Origins, directions, tmin and tmax as the core takes them; memory is shared where it can be."""
+    def numpy(self, real: Real = FLOAT32) -> tuple[Floats, Floats, Floats, Floats]:
+        """Origins, directions, tmin and tmax as the core takes them; memory is shared if it can be."""
         if self.library is NUMPY:
             return arguments.rays(self.origins, self.directions, self.tmin, self.tmax, real)
-
-        def host(value: Any) -> Any:
-            return library_of(value).to_numpy(value)
-
-        origins, directions = host(self.origins), host(self.directions)
-        return arguments.rays(origins, directions, host(self.tmin), host(self.tmax), real)
+        given = zip(self.libraries, self[:4], strict=True)
+        origins, directions, tmin, tmax = (library.to_numpy(value) for library, value in given)
+        return arguments.rays(origins, directions, tmin, tmax, real)
 
 
 def check_rays(
@@ -42,7 +42,7 @@ def check_rays(
     backend: str,
     device: str | None,
 ) -> Rays:
-    """The rays, where they are arrays of one library that lie where the scene traces.
+    """The rays, if they are arrays of one library that lie where the scene traces.
 
     Numbers and vectors of shape (3,) may always be NumPy's. Raises TypeError or ValueError otherwise.
     """
@@ -53,21 +53,22 @@ def check_rays(
         and isinstance(tmax, NUMPY_TYPES)
     ):
         return Rays(origins, directions, tmin, tmax, NUMPY)
-    named = {"origins": origins, "directions": directions, "tmin": tmin, "tmax": tmax}
-    libraries = {name: library_of(value) for name, value in named.items()}
-    foreign = {name: library for name, library in libraries.items() if library is not NUMPY}
+    values = origins, directions, tmin, tmax
+    libraries = library_of(origins), library_of(directions), library_of(tmin), library_of(tmax)
+    given = list(zip(NAMES, values, libraries, strict=True))
+    foreign = [one for one in given if one[2] is not NUMPY]
     if not foreign:
-        return Rays(origins, directions, tmin, tmax, NUMPY)
-    first, library = next(iter(foreign.items()))
-    for name, other in libraries.items():
-        if other.name != library.name and not (other is NUMPY and _is_shared(named[name])):
+        return Rays(*values, NUMPY)
+    first, _, library = foreign[0]
+    for name, value, other in given:
+        if other.name != library.name and not (other is NUMPY and _is_shared(value)):
             raise TypeError(
                 f"{first} and {name} must be arrays of one library, got {library.name} and {other.name}: "
                 "convert one of them"
             )
-    for name, other in foreign.items():
-        _check_device(name, other.device(named[name]), backend, device)
-    return Rays(origins, directions, tmin, tmax, _answering(foreign))
+    for name, value, other in foreign:
+        _check_place(name, other.device(value), backend, device)
+    return Rays(*values, _answering(libraries, library), libraries)
 
 
 def _is_shared(value: Any) -> bool:
@@ -75,24 +76,24 @@ def _is_shared(value: Any) -> bool:
     return np.ndim(value) == 0 or np.shape(value) == (3,)
 
 
-def _check_device(name: str, found: str | None, backend: str, device: str | None) -> None:
-    if device is None and found != "cpu":
-        place = found or "a CUDA device"
+def _check_place(name: str, place: str | None, backend: str, device: str | None) -> None:
+    if lies_on(place, device or "cpu"):
+        return
+    found = place or "a CUDA device"
+    if device is None:
         raise ValueError(
-            f"{name} must be in host memory for backend {backend!r}, got an array on {place}: "
-            f"copy it to the host, or make the scene with device={(found or 'cuda:0')!r}"
+            f"{name} must be in host memory for backend {backend!r}, got an array on {found}: "
+            f"copy it to the host, or make the scene with device={(place or 'cuda:0')!r}"
         )
-    if device is not None and found not in (device, None if device != "cpu" else device):
-        raise ValueError(
-            f"{name} must be on the scene's device {device}, got an array on {found or 'a CUDA device'}: "
-            "copy it there, or make the scene on that device"
-        )
+    raise ValueError(
+        f"{name} must be on the scene's device {device}, got an array on {found}: "
+        "copy it there, or make the scene on that device"
+    )
 
 
-def _answering(foreign: Mapping[str, Library]) -> Library:
+def _answering(libraries: Libraries, first: Library) -> Library:
     """The library of the answer: among Warp arrays, the one whose arrays hold vectors."""
-    for name in ("origins", "directions"):
-        library = foreign.get(name)
+    for library in libraries[:2]:
         if isinstance(library, WarpArrays) and library.vectors:
             return library
-    return next(iter(foreign.values()))
+    return first

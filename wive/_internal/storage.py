@@ -1,6 +1,5 @@
-"""A scene as one file: its mesh and its options; the tree is rebuilt on loading, and comes out the same."""
+"""A scene as one file: its mesh and its options. Loading builds the tree again, bit for bit the same."""
 
-import json
 from typing import Literal, TypedDict
 
 import numpy as np
@@ -29,6 +28,8 @@ def write_scene(path: PathLike, vertices: Floats, faces: NDArray[np.int32], opti
 
     An interrupted or failed write leaves nothing behind.
     """
+    import json
+
     header = json.dumps({"format": FORMAT, "version": FORMAT_VERSION, "options": options})
     with atomic_write(path) as file:
         np.savez(file, header=np.array(header), vertices=vertices, faces=faces)
@@ -37,8 +38,10 @@ def write_scene(path: PathLike, vertices: Floats, faces: NDArray[np.int32], opti
 def read_scene(path: PathLike) -> tuple[Floats, NDArray[np.int32], Options]:
     """Read what `write_scene` wrote.
 
-    Raises OSError where the file can't be read, ValueError where it is no scene or of a newer version.
+    Raises OSError if the file can't be read, ValueError if it is no scene or of a newer version.
     """
+    import json
+
     arrays = read_npz(path, "a scene saved by wive")
     if not {"header", "vertices", "faces"} <= arrays.keys():
         raise ValueError(f"{path}: not a scene saved by wive")

@@ -1,4 +1,4 @@
-"""The mesh that needs no file: real terrain that matplotlib ships."""
+"""The default mesh of `wive render`: real terrain that comes with matplotlib."""
 
 import math
 
@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from wive.camera import Camera
 
 METRES_PER_DEGREE = 111_320.0
-# The valleys are 800 m deep in 30 km of land: too little for a picture.
+# The valleys are 800 m deep in 30 km of land: too little to see in a picture.
 EXAGGERATION = 4.0
 
 
@@ -16,7 +16,7 @@ def terrain_mesh() -> tuple[NDArray[np.float32], NDArray[np.int32]]:
     """The Jacksboro fault, Tennessee: (138632,3) vertices in metres (east, north, up) and (275772,3) faces.
 
     Elevations are multiplied by 4. The data is `jacksboro_fault_dem.npz` among matplotlib's samples.
-    Raises ImportError where matplotlib is missing.
+    Raises ImportError if matplotlib is missing.
     """
     try:
         from matplotlib import cbook

@@ -1,0 +1,83 @@
+"""What users see of the package: its names, its signatures, and what importing it brings."""
+
+import copy
+import inspect
+import pickle
+import subprocess
+import sys
+import tempfile
+
+import numpy as np
+import pytest
+from support.meshes import TRIANGLE, sphere
+
+import wive
+
+
+def functions() -> dict[str, object]:
+    """Every public function, class and method, by dotted name."""
+    found: dict[str, object] = {}
+    for name in wive.__all__:
+        member = getattr(wive, name)
+        if inspect.ismodule(member):
+            continue
+        found[name] = member
+        if inspect.isclass(member):
+            methods = inspect.getmembers(member, inspect.isroutine)
+            found |= {f"{name}.{key}": method for key, method in methods if not key.startswith("_")}
+    found["trimesh.RayMeshIntersector"] = wive.trimesh.RayMeshIntersector
+    return found
+
+
+def test_the_package_shows_its_public_names_alone():
+    assert sorted(dir(wive)) == sorted(wive.__all__)
+    assert all(hasattr(wive, name) for name in wive.__all__)
+
+
+@pytest.mark.parametrize(("name", "function"), functions().items(), ids=functions())
+def test_signatures_fit_on_a_screen(name, function):
+    assert len(str(inspect.signature(function))) < 300, name
+
+
+def test_importing_the_package_imports_nothing_slow():
+    slow = "argparse email importlib.metadata secrets tempfile trimesh tqdm warp torch PIL matplotlib"
+    program = f"""
+import sys, numpy
+before = set(sys.modules)
+import wive
+print(sorted((set(sys.modules) - before) & set({slow.split()!r})))"""
+    finished = subprocess.run(
+        [sys.executable, "-c", program],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        cwd=tempfile.gettempdir(),
+        check=True,
+    )
+    assert finished.stdout == "[]\n"
+
+
+def test_scenes_of_cpu_backends_do_not_look_at_the_version_of_warp(monkeypatch):
+    def refused(name: str) -> str:
+        raise AssertionError(f"the version of {name} was looked up")
+
+    monkeypatch.setattr("importlib.metadata.version", refused)
+    assert wive.Scene(*TRIANGLE).device is None
+    assert wive.Scene(*TRIANGLE, backend="scalar").backend == "scalar"
+
+
+@pytest.mark.parametrize("query", ["intersect", "intersect_all"])
+def test_hits_can_be_pickled_and_copied_and_equal_themselves_alone(query):
+    scene = wive.Scene(*sphere(2))
+    hits = getattr(scene, query)(np.zeros((5, 3), np.float32), np.eye(5, 3, dtype=np.float32))
+    for again in (pickle.loads(pickle.dumps(hits)), copy.copy(hits), copy.deepcopy(hits)):
+        assert type(again) is type(hits)
+        assert repr(again) == repr(hits)
+        assert again != hits
+        for name in ("t", "prim", "uv", "vertices", "faces"):
+            np.testing.assert_array_equal(getattr(again, name), getattr(hits, name))
+        np.testing.assert_array_equal(again.points(), hits.points())
+    if query == "intersect":
+        np.testing.assert_array_equal(pickle.loads(pickle.dumps(hits)).error_bound, hits.error_bound)
+    assert hits == hits
+    assert len({hits, hits}) == 1

@@ -1,0 +1,92 @@
+"""Points and normals of triangles hit, computed on a Warp device in double."""
+
+# mypy: disable-error-code="untyped-decorator, valid-type, no-redef"
+
+import functools
+from types import SimpleNamespace
+
+import warp as wp
+
+from wive.warp_kernels.lanes.precision import PRECISIONS
+
+OPTIONS = {"enable_backward": False, "fuse_fp": False}
+
+
+@wp.func
+def in_double(v: wp.vec3) -> wp.vec3d:
+    """The same vector."""
+    return wp.vec3d(wp.float64(v[0]), wp.float64(v[1]), wp.float64(v[2]))
+
+
+@wp.func
+def in_double(v: wp.vec3d) -> wp.vec3d:  # noqa: D103, F811
+    return v
+
+
+@functools.cache
+def hit_kernels(precision: str) -> SimpleNamespace:
+    """The kernels for scenes of that precision, compiled together."""
+    numbers = PRECISIONS[precision]
+    vec2, vec3 = numbers.vec2, numbers.vec3
+    module = wp.get_module(f"{__name__}.{precision}")
+    wp.set_module_options(OPTIONS, module=module)
+
+    @wp.kernel(module=module)
+    def mask(prim: wp.array[wp.int32], mask: wp.array[wp.bool]) -> None:
+        i = wp.tid()
+        mask[i] = prim[i] >= 0
+
+    @wp.kernel(module=module)
+    def points(
+        vertices: wp.array[vec3],
+        faces: wp.array[wp.vec3i],
+        prim: wp.array[wp.int32],
+        uv: wp.array[vec2],
+        points: wp.array[wp.vec3d],
+    ) -> None:
+        i = wp.tid()
+        if prim[i] < 0:
+            points[i] = wp.vec3d(wp.float64(wp.nan))
+            return
+        face = faces[prim[i]]
+        u = wp.float64(uv[i][0])
+        v = wp.float64(uv[i][1])
+        w = wp.float64(1.0) - u - v
+        points[i] = (
+            w * in_double(vertices[face[0]])
+            + u * in_double(vertices[face[1]])
+            + v * in_double(vertices[face[2]])
+        )
+
+    @wp.kernel(module=module)
+    def normals(
+        vertices: wp.array[vec3],
+        faces: wp.array[wp.vec3i],
+        prim: wp.array[wp.int32],
+        normals: wp.array[wp.vec3d],
+    ) -> None:
+        i = wp.tid()
+        if prim[i] < 0:
+            normals[i] = wp.vec3d(wp.float64(wp.nan))
+            return
+        face = faces[prim[i]]
+        v0 = in_double(vertices[face[0]])
+        across = wp.cross(in_double(vertices[face[1]]) - v0, in_double(vertices[face[2]]) - v0)
+        normals[i] = across / wp.length(across)
+
+    return SimpleNamespace(mask=mask, points=points, normals=normals)
+
+
+@wp.kernel(enable_backward=False)
+def count_hits(offsets: wp.array[wp.int64], counts: wp.array[wp.int32]) -> None:
+    """The number of hits per ray, of dimension (n,)."""
+    i = wp.tid()
+    counts[i] = wp.int32(offsets[i + 1] - offsets[i])
+
+
+@wp.kernel(enable_backward=False)
+def number_rays(offsets: wp.array[wp.int64], ray: wp.array[wp.int64]) -> None:
+    """The ray of each hit, of dimension (n,)."""
+    i = wp.tid()
+    for row in range(wp.int32(offsets[i]), wp.int32(offsets[i + 1])):
+        ray[row] = wp.int64(i)

@@ -1,0 +1,99 @@
+"""Queries and pictures by the compiled core."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, NoReturn
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wive import _cpu
+from wive._internal import arguments
+from wive._internal.arguments import Work
+from wive._internal.arrays import NUMPY
+from wive._internal.precision import Floats, real_of
+from wive._internal.rays import Rays
+from wive._internal.wrapping import Wrapping
+from wive.all_hits import AllHits, WrappedAllHits
+from wive.hits import Hits, Stats, WrappedHits, stats_of
+
+if TYPE_CHECKING:
+    from wive.rendering import Image, Settings
+
+
+class CpuTracer:
+    """The tree in host memory, and the kernels of one CPU backend."""
+
+    device = None
+    options = frozenset({"threads", "in_flight"})
+
+    def __init__(self, bvh: _cpu.Bvh, faces: NDArray[np.int32], backend: str) -> None:
+        """Take the tree; the kernels are looked up by the first query."""
+        self.bvh, self.backend = bvh, backend
+        self._faces, self._accuracy, self._real = faces, bvh.accuracy, real_of(bvh.vertices)
+        self._kernels = _cpu.Kernels(backend)
+
+    @property
+    def tree(self) -> NoReturn:
+        """ValueError: the tree for `wive.warp_kernels` is on a Warp device."""
+        raise ValueError(
+            f"tree is for scenes with backend 'warp', this one has {self.backend!r}: "
+            "make it with device='cpu' or device='cuda:0'"
+        )
+
+    def intersect(self, rays: Rays, work: Work) -> tuple[Hits, Stats | None]:
+        """Closest hits."""
+        t, prim, uv, steps = self.bvh.intersect(self._kernels, *self._given(rays, work))
+        hits = Hits(t, prim, uv, self.bvh.vertices, self._faces, rays, self._accuracy)
+        if rays.library is not NUMPY:
+            hits = WrappedHits(hits, _wrapping(rays))
+        return hits, stats_of(steps, rays.library)
+
+    def occluded(self, rays: Rays, work: Work) -> tuple[Any, Stats | None]:
+        """(n,) bool, whether anything is hit."""
+        mask, steps = self.bvh.occluded(self._kernels, *self._given(rays, work))
+        return rays.library.from_numpy(mask), stats_of(steps, rays.library)
+
+    def count(self, rays: Rays, work: Work) -> tuple[Any, Stats | None]:
+        """(n,) int32, the number of hits."""
+        counts, steps = self.bvh.count(self._kernels, *self._given(rays, work))
+        return rays.library.from_numpy(counts), stats_of(steps, rays.library)
+
+    def intersect_all(self, rays: Rays, work: Work) -> tuple[AllHits, Stats | None]:
+        """All hits."""
+        offsets, t, prim, uv, steps = self.bvh.intersect_all(self._kernels, *self._given(rays, work))
+        hits = AllHits(offsets, t, prim, uv, self.bvh.vertices, self._faces)
+        if rays.library is not NUMPY:
+            hits = WrappedAllHits(hits, _wrapping(rays))
+        return hits, stats_of(steps, rays.library)
+
+    def refitted(self, vertices: Floats) -> CpuTracer:
+        """A tracer of moved vertices, as many as before."""
+        return CpuTracer(self.bvh.refitted(vertices), self._faces, self.backend)
+
+    def rows_renderer(self, camera: Image, image: Image, settings: Settings) -> Callable[[int, int], int]:
+        """A function that renders rows [begin, end) into `image` and returns how many rays it traced.
+
+        Its first call checks the mesh, whose arrays the caller may have changed since the tree was built.
+        """
+        what = settings.spp, settings.bounces, settings.albedo, settings.seed
+        threads = arguments.threads(settings.threads)
+        unchecked = True
+
+        def render_rows(begin: int, end: int) -> int:
+            nonlocal unchecked
+            check, unchecked = unchecked, False
+            return self.bvh.render_rows(
+                self._kernels, camera, image, begin, end, *what, threads=threads, check=check
+            )
+
+        return render_rows
+
+    def _given(self, rays: Rays, work: Work) -> tuple[Floats, Floats, Floats, Floats, int, int, bool]:
+        """What every query of the core takes behind its kernels."""
+        return *rays.numpy(self._real), work.threads, work.in_flight, work.stats
+
+
+def _wrapping(rays: Rays) -> Wrapping:
+    return Wrapping(rays.library, "cpu", rays.library.from_numpy)

@@ -1,0 +1,63 @@
+"""What `wive.Scene` traces with: the tree over its mesh, on one backend."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, Protocol
+
+from wive import _cpu
+from wive._internal.arguments import Work
+from wive._internal.precision import Floats
+from wive._internal.rays import Rays
+
+if TYPE_CHECKING:
+    from wive.all_hits import AllHits
+    from wive.hits import Hits, Stats
+    from wive.rendering import Image, Settings
+    from wive.warp_kernels import Tree
+
+
+class Tracer(Protocol):
+    """The queries of a scene on one backend; never changed, so that a query sees one shape of the mesh.
+
+    Queries take checked arguments, and return arrays of the library that the rays came in. Their second
+    result is None unless `work.stats`.
+    """
+
+    @property
+    def backend(self) -> str:
+        """The backend's name."""
+
+    @property
+    def device(self) -> str | None:
+        """The Warp device; None for CPU backends."""
+
+    @property
+    def options(self) -> frozenset[str]:
+        """The options that this backend has and others don't."""
+
+    @property
+    def bvh(self) -> _cpu.Bvh:
+        """The tree in host memory."""
+
+    @property
+    def tree(self) -> Tree:
+        """The tree on the Warp device; ValueError for CPU backends."""
+
+    def intersect(self, rays: Rays, work: Work) -> tuple[Hits, Stats | None]:
+        """Closest hits."""
+
+    def occluded(self, rays: Rays, work: Work) -> tuple[Any, Stats | None]:
+        """(n,) bool, whether anything is hit."""
+
+    def count(self, rays: Rays, work: Work) -> tuple[Any, Stats | None]:
+        """(n,) int32, the number of hits."""
+
+    def intersect_all(self, rays: Rays, work: Work) -> tuple[AllHits, Stats | None]:
+        """All hits."""
+
+    def refitted(self, vertices: Floats) -> Tracer:
+        """A tracer of moved vertices, as many as before."""
+
+    def rows_renderer(self, camera: Image, image: Image, settings: Settings) -> Callable[[int, int], int]:
+        """A function that renders rows [begin, end) into `image` and returns how many rays it traced."""

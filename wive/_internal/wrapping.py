@@ -1,0 +1,34 @@
+"""Results in the arrays of the library that the rays came in."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+from wive._internal.arrays import Library
+
+
+class Wrapping(NamedTuple):
+    """How a backend's arrays become arrays of a library, and where they are computed."""
+
+    library: Library
+    device: str  # of the backend's arrays, by Warp's names
+    wrap: Callable[[Any], Any]
+
+    def __call__(self, compute: Callable[[], Any]) -> Any:
+        """The arrays that `compute` returns, wrapped."""
+        return self.wrap(compute())
+
+
+def from_home(member: Any) -> Any:
+    """`member`, a property or a method of results, computed by their `_home` and wrapped by `_wrapping`."""
+    if isinstance(member, property):
+        name = member.fget.__name__  # type: ignore[union-attr]
+        return property(lambda self: self._wrapping(lambda: getattr(self._home, name)), doc=member.__doc__)
+
+    @functools.wraps(member)
+    def method(self: Any, *arguments: Any, **keywords: Any) -> Any:
+        return self._wrapping(lambda: getattr(self._home, member.__name__)(*arguments, **keywords))
+
+    return method
