@@ -107,7 +107,8 @@ class WrappedAllHits(AllHits):
 
     def __getitem__(self, i: int) -> AllHits:
         """The hits of ray i; on a device this waits for it."""
-        return WrappedAllHits(self._home[i], self._wrapping)
+        with self._wrapping.on_stream():
+            return WrappedAllHits(self._home[i], self._wrapping)
 
     def __repr__(self) -> str:
         """Number of rays and of hits, and the library of their arrays."""

@@ -53,7 +53,7 @@ class WarpTracer:
     options = frozenset({"lanes"})
 
     def __init__(self, bvh: _cpu.Bvh, faces: NDArray[np.int32], device: str) -> None:
-        """Copy tree and mesh to the device."""
+        """Copy tree and mesh to the device, and wait until they are there: queries may use any stream."""
         self.bvh, self.device = bvh, device
         self.vertices, self.faces = bvh.vertices, faces
         self.accuracy, self.precision = bvh.accuracy, bvh.precision
@@ -65,6 +65,7 @@ class WarpTracer:
             wp.array(self.vertices, dtype=self._numbers.vec3, device=device, copy=False),
             wp.array(faces, dtype=wp.vec3i, device=device, copy=False),
         )
+        wp.synchronize_stream(device)
 
     def intersect(self, rays: Rays, work: Work) -> tuple[Hits, Stats | None]:
         """Closest hits."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable
+from contextlib import AbstractContextManager
 from typing import Any, NamedTuple
 
 from wive._internal.arrays import Library
@@ -17,8 +18,13 @@ class Wrapping(NamedTuple):
     wrap: Callable[[Any], Any]
 
     def __call__(self, compute: Callable[[], Any]) -> Any:
-        """The arrays that `compute` returns, wrapped."""
-        return self.wrap(compute())
+        """The arrays that `compute` returns, wrapped; it allocates and launches on the library's stream."""
+        with self.on_stream():
+            return self.wrap(compute())
+
+    def on_stream(self) -> AbstractContextManager[Any]:
+        """A block whose Warp launches and allocations go to the library's current stream."""
+        return self.library.on_stream(self.device)
 
 
 def from_home(member: Any) -> Any:
