@@ -16,17 +16,17 @@ compiler: str  # the C++ compiler's name and version
 exact_source: str  # C++ text of the exact arithmetic, which the Warp kernels compile as well
 
 def kernels() -> dict[str, str]:
-    """Every traversal kernel compiled in, best first, and why this machine can't run it ("" where it can).
+    """Every traversal kernel compiled in, best first, and why this machine can't run it ("" if it can).
 
     Names: "avx512" (the better of the two forms below), "avx512.full", "avx512.half", "avx2", "scalar"; and,
     sorting children by distance for comparisons, "avx512.distance" and "scalar.distance".
     """
 
 def avx512_form() -> Literal["full", "half"]:
-    """The form of the slab test that kernel "avx512" uses here, as the first query with it decides.
+    """The form of the slab test that kernel "avx512" uses here; the first query with that kernel decides it.
 
-    Raises ValueError where this machine can't run either, or where the environment variable
-    WIVE_AVX512_FORM is none of "full", "half" and "race".
+    Raises ValueError if this machine can't run either form, or if the environment variable WIVE_AVX512_FORM
+    is none of "full", "half" and "race".
     """
 
 class Kernels:
@@ -59,7 +59,7 @@ class Bvh:
     def refitted(self, vertices: NDArray[Real], threads: int = 0) -> Bvh:
         """A tree over the same faces and moved vertices (v,3), of the same shape.
 
-        Of another shape where a triangle without an area gains some. Raises ValueError as construction does.
+        Of another shape if a triangle without an area gains some. Raises ValueError as construction does.
         """
     @property
     def vertices(self) -> NDArray[Any]:
@@ -70,18 +70,18 @@ class Bvh:
     def nodes(self) -> NDArray[np.uint32]:
         """(m,8,8) read-only view, rows lo.x hi.x lo.y hi.y lo.z hi.z child order; planes are float32 bits.
 
-        Compressed: (m,4,8), the 128 bytes of CompressedNode in cpu/compressed.h.
+        Compressed: (m,4,8), the 128 bytes of CompressedNode in cpu/core/compressed.h.
         """
     @property
     def blocks(self) -> NDArray[np.uint32]:
         """(b,10,4) read-only view: nine float32 rows (fast: v0 e1 e2; else: v0 v1 v2), the prim row.
 
-        Compressed: (units,8), blocks of three or four units, CompressedBlock in cpu/compressed.h.
+        Compressed: (units,8), blocks of three or four units, CompressedBlock in cpu/core/compressed.h.
         float64, whatever the nodes: (b,20,4), nine rows of four float64, the prim row, a row of zeros.
         """
     @property
     def units(self) -> NDArray[np.uint32]:
-        """(units,8) read-only view of all of it: nodes, then blocks, in units of 32 bytes.
+        """(units,8) read-only view of the whole tree: nodes, then blocks, in units of 32 bytes.
 
         A child reference holds (unit << 3); a leaf sets bit 31 and its number of blocks less one in the low 3
         bits.
@@ -94,7 +94,7 @@ class Bvh:
         """(3,) the largest |plane| on each axis: the half size of the tree round its center."""
     @property
     def bounds(self) -> NDArray[Any]:
-        """(2,3) lowest and highest corner of the triangles that can be hit; inf, -inf without any."""
+        """(2,3) lowest and highest corner of the triangles that can be hit; inf, -inf if there are none."""
     @property
     def accuracy(self) -> str: ...
     @property
@@ -102,7 +102,7 @@ class Bvh:
         """ "float32" or "compressed"."""
     @property
     def depth(self) -> int:
-        """Inner nodes on the longest way from the root down."""
+        """Inner nodes on the longest path from the root down."""
     @property
     def memory(self) -> int:
         """Bytes of nodes and triangle blocks."""
@@ -157,8 +157,8 @@ class Bvh:
     ]:
         """All hits: offsets (n+1,), t (h,), prim (h,), uv (h,2), and stats (n,3) or None.
 
-        Those of ray i are rows offsets[i] to offsets[i+1], by ascending t, then prim. Raises MemoryError
-        where they don't fit.
+        Those of ray i are rows offsets[i] to offsets[i+1], by ascending t, then prim. Raises MemoryError if
+        the hits don't fit.
         """
     def count(
         self,
@@ -201,7 +201,7 @@ class Bvh:
 def surface_points(
     vertices: NDArray[Real], faces: NDArray[np.int32], prim: NDArray[np.int32], uv: NDArray[Real]
 ) -> NDArray[np.float64]:
-    """(n,3) points at uv (n,2) of triangles prim (n,), in double; NaN where there is no such triangle."""
+    """(n,3) points at uv (n,2) of triangles prim (n,), in double; NaN if there is no such triangle."""
 
 def points_on_rays(
     vertices: NDArray[np.float64],
@@ -212,9 +212,9 @@ def points_on_rays(
     origins: NDArray[np.float64],
     directions: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """(n,3) points where rays ray (n,) meet the planes of triangles prim (n,), at uv where they are flat."""
+    """(n,3) points where rays ray (n,) meet the planes of triangles prim (n,); at uv if they graze it."""
 
 def surface_normals(
     vertices: NDArray[Real], faces: NDArray[np.int32], prim: NDArray[np.int32]
 ) -> NDArray[np.float64]:
-    """(n,3) unit normals of triangles prim (n,), in double; NaN where there is no such triangle."""
+    """(n,3) unit normals of triangles prim (n,), in double; NaN if there is no such triangle."""

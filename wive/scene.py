@@ -264,7 +264,7 @@ class Scene:
 
     @property
     def bounds(self) -> Floats:
-        """(2,3) lowest and highest corner of the triangles that can be hit; inf, -inf without any.
+        """(2,3) lowest and highest corner of the triangles that can be hit; inf, -inf if there are none.
 
         float32 or float64 as `precision` says.
         """

@@ -20,7 +20,7 @@ from wive.scene import Scene
 Float64 = NDArray[np.float64]
 Int64 = NDArray[np.int64]
 
-# Directions of the rays of `contains_points`, tried until a ray and its opposite agree; trimesh uses the first.
+# Directions for `contains_points`, tried until a ray and its opposite agree; the first is trimesh's.
 DIRECTIONS = (
     (0.4395064455, 0.617598629942, 0.652231566745),
     (-0.7312847092, 0.2291845177, 0.6424302511),

@@ -165,7 +165,7 @@ def test_origins_depend_on_the_side_alone_and_cross_the_surface() -> None:
 @pytest.mark.parametrize(
     ("directions", "error", "text"),
     [
-        (np.zeros((3, 3)), ValueError, "have shape (2, 3), one a hit, or (3,), got (3, 3)"),
+        (np.zeros((3, 3)), ValueError, "have shape (2, 3), one per hit, or (3,), got (3, 3)"),
         (np.zeros(2), ValueError, "have shape (n, 3), or (3,) if all rays share it, got (2,)"),
         (["up"], TypeError, "be an (n, 3) array of real numbers, got dtype <U2: convert it first"),
     ],

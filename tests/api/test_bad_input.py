@@ -65,7 +65,7 @@ def message(error: pytest.ExceptionInfo[Exception]) -> str:
             VERTICES,
             [[0, 1, 2, 0]],
             ValueError,
-            "faces must have shape (f, 3), one row of three vertex indices a triangle, got (1, 4)",
+            "faces must have shape (f, 3), one row of three vertex indices per triangle, got (1, 4)",
         ),
         (
             VERTICES,
@@ -219,13 +219,13 @@ def test_a_scene_saved_elsewhere_needs_its_backend_here_unless_it_was_auto(monke
             (ORIGINS, ORIGINS, [0, 0]),
             {},
             ValueError,
-            "tmin must be one number or have shape (4,), one a ray, got shape (2,)",
+            "tmin must be one number or have shape (4,), one per ray, got shape (2,)",
         ),
         (
             (ORIGINS, ORIGINS, 0, ORIGINS),
             {},
             ValueError,
-            "tmax must be one number or have shape (4,), one a ray, got shape (4, 3)",
+            "tmax must be one number or have shape (4,), one per ray, got shape (4, 3)",
         ),
         (
             (ORIGINS, ORIGINS, 0, None),

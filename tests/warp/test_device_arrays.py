@@ -91,7 +91,9 @@ def test_spawned_origins_and_error_bounds_come_back_in_the_library_of_the_rays(s
         if library.name != "dlpack":  # whose arrays from elsewhere are read-only in these tests
             blocked = scene.occluded(origins, library.make(RAYS[1]))
             np.testing.assert_array_equal(library.read(blocked), scene.occluded(wanted, RAYS[1]))
-    with pytest.raises(ValueError, match=r"directions must have shape \(777, 3\), one a hit, or \(3,\), got"):
+    with pytest.raises(
+        ValueError, match=r"directions must have shape \(777, 3\), one per hit, or \(3,\), got"
+    ):
         hits.spawn(library.make(RAYS[1][:5]))
 
 

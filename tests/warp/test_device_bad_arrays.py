@@ -118,13 +118,13 @@ def plain(values, dtype=float):
             {"device": "cpu"},
             lambda: (vec3(), vec3(), plain(np.zeros(3))),
             ValueError,
-            "tmin must be one number or have shape (4,), one a ray, got shape (3,)",
+            "tmin must be one number or have shape (4,), one per ray, got shape (3,)",
         ),
         (
             {"device": "cpu"},
             lambda: (vec3(), vec3(), 0.0, vec3()),
             ValueError,
-            "tmax must be one number or have shape (4,), one a ray, got shape (4, 3)",
+            "tmax must be one number or have shape (4,), one per ray, got shape (4, 3)",
         ),
     ],
 )

@@ -1,4 +1,4 @@
-"""Hits on a Warp device: what is not an array of theirs is computed there when used.
+"""Hits on a Warp device: masks, points and the like are computed there when used.
 
 `wive.hits.WrappedHits` and `wive.all_hits.WrappedAllHits` call these on the stream of the user's library.
 """

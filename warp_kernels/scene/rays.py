@@ -92,7 +92,7 @@ class RayLoader:
             return _view(array, count, 0)
         if len(array) != count:
             raise ValueError(
-                f"directions must have shape ({count}, 3), one a hit, or (3,), got {(len(array), 3)}"
+                f"directions must have shape ({count}, 3), one per hit, or (3,), got {(len(array), 3)}"
             )
         return array
 
@@ -122,7 +122,7 @@ class RayLoader:
         array = self._checked(name, value, library)
         if array.shape not in ((1,), (count,)) or array.dtype is not self._real:
             raise ValueError(
-                f"{name} must be one number or have shape ({count},), one a ray, got shape {_shape(array)}"
+                f"{name} must be one number or have shape ({count},), one per ray, got shape {_shape(array)}"
             )
         return array
 

@@ -14,7 +14,7 @@ OPTIONS = {"enable_backward": False, "fuse_fp": False}
 
 @wp.func
 def in_double(v: wp.vec3) -> wp.vec3d:
-    """The same vector."""
+    """The vector in double."""
     return wp.vec3d(wp.float64(v[0]), wp.float64(v[1]), wp.float64(v[2]))
 
 

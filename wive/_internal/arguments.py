@@ -106,7 +106,7 @@ def mesh(vertices: ArrayLike, faces: ArrayLike, accuracy: str = "watertight") ->
         corners = corners.reshape(0, 3)
     if corners.ndim != 2 or corners.shape[1] != 3:
         raise ValueError(
-            f"faces must have shape (f, 3), one row of three vertex indices a triangle, got {corners.shape}"
+            f"faces must have shape (f, 3), one row of three vertex indices per triangle, got {corners.shape}"
         )
     if corners.size and (corners.min() < 0 or corners.max() >= len(points)):
         face = int(np.argmax(((corners < 0) | (corners >= len(points))).any(axis=1)))
@@ -165,12 +165,12 @@ def rays(
 
 
 def directions(value: ArrayLike, count: int, real: Real = FLOAT32) -> Floats:
-    """The directions of `count` rays, (count,3) of `real`'s dtype, C-contiguous unless all share one."""
+    """The directions of `count` rays, (count,3) of `real`'s dtype, C-contiguous unless all rays share one."""
     rows = value if _is_ready(value, real.dtype) else _vectors("directions", value, real)
     if rows.ndim == 1:
         return np.broadcast_to(rows, (count, 3))
     if len(rows) != count:
-        raise ValueError(f"directions must have shape ({count}, 3), one a hit, or (3,), got {rows.shape}")
+        raise ValueError(f"directions must have shape ({count}, 3), one per hit, or (3,), got {rows.shape}")
     return rows
 
 
@@ -228,7 +228,7 @@ def limits(name: str, value: ArrayLike, count: int, real: Real = FLOAT32) -> Flo
     array = _numeric(name, value, "a real number or one per ray", "fiu")
     if array.shape not in ((), (count,)):
         raise ValueError(
-            f"{name} must be one number or have shape ({count},), one a ray, got shape {array.shape}"
+            f"{name} must be one number or have shape ({count},), one per ray, got shape {array.shape}"
         )
     return real.array(array.reshape(-1))
 

@@ -1,7 +1,7 @@
-"""The libraries whose arrays queries take and return: NumPy, Warp, PyTorch, and whatever speaks DLPack.
+"""The libraries whose arrays queries take and return: NumPy, Warp, PyTorch, and all that support DLPack.
 
-Each class carries one library's arrays to NumPy or to Warp and back, sharing memory. None of them is imported
-here: an array of a library can't come in before somebody has imported it.
+Each class converts one library's arrays to NumPy or to Warp and back, sharing memory. No library is imported
+here: if there is an array of it, it has been imported already.
 """
 
 import contextlib
@@ -19,27 +19,27 @@ NDArrayAny = NDArray[Any]
 
 
 class Library(Protocol):
-    """One library's arrays. Nothing copies where memory can be shared."""
+    """One library's arrays. Conversions share memory if they can, and copy if not."""
 
     name: str
 
     def device(self, array: Any) -> str | None:
-        """Where the array lies, by Warp's names; None where it does not say."""
+        """The array's device, by Warp's names; None if the library doesn't tell."""
 
     def to_numpy(self, array: Any) -> NDArrayAny:
-        """An array in host memory as NumPy's."""
+        """The library's array in host memory as a NumPy array."""
 
     def from_numpy(self, array: NDArrayAny) -> Any:
-        """The way back."""
+        """A NumPy array as the library's."""
 
     def to_warp(self, array: Any, device: str) -> Any:
-        """An array on that device as Warp's, once its producer's stream allows."""
+        """The library's array on `device` as a Warp array, ordered behind the stream that writes it."""
 
     def from_warp(self, array: Any) -> Any:
-        """The way back, in the order of the consumer's stream."""
+        """A Warp array as the library's, ordered before the stream that reads it."""
 
     def on_stream(self, device: str) -> contextlib.AbstractContextManager[Any]:
-        """A block whose Warp launches go to the library's current stream; without one, to Warp's own."""
+        """A block whose Warp launches and allocations use the library's current stream, if it has streams."""
 
 
 class _OnWarpStream:
@@ -49,7 +49,7 @@ class _OnWarpStream:
 
 
 class NumPyArrays(_OnWarpStream):
-    """NumPy's arrays, and lists and numbers that it makes arrays of."""
+    """NumPy's arrays, and the lists and numbers that NumPy converts."""
 
     name = "NumPy"
 
@@ -58,26 +58,26 @@ class NumPyArrays(_OnWarpStream):
         return "cpu"
 
     def to_numpy(self, array: Any) -> Any:
-        """As it is: conversions are those of `wive._internal.arguments`."""
+        """The array itself: `wive._internal.arguments` converts it."""
         return array
 
     def from_numpy(self, array: NDArrayAny) -> Any:
-        """As it is."""
+        """The array itself."""
         return array
 
     def to_warp(self, array: Any, device: str) -> Any:
-        """Copied to the device if that is not the host."""
+        """An array on the device: a copy, unless the device is the host."""
         import warp as wp
 
         return wp.array(array, device=device, copy=False)
 
     def from_warp(self, array: Any) -> Any:
-        """Copied to the host if it is not there."""
+        """An array on the host: a copy, unless the device is the host."""
         return array.numpy()
 
 
 class WarpArrays(_OnWarpStream):
-    """Warp's arrays; `vectors` says that pairs of floats come back as vec2, as rays came as vec3."""
+    """Warp's arrays. `vectors`: rays were given as vec3, so that pairs of floats are returned as vec2."""
 
     name = "Warp"
 
@@ -86,16 +86,16 @@ class WarpArrays(_OnWarpStream):
         self.vectors = vectors
 
     def device(self, array: Any) -> str | None:
-        """The array's."""
+        """The array's device."""
         return str(array.device.alias)
 
     def to_numpy(self, array: Any) -> NDArrayAny:
-        """A view; a vec3 becomes a row."""
+        """A view with one row per vec3."""
         found: NDArrayAny = array.numpy()
         return found
 
     def from_numpy(self, array: NDArrayAny) -> Any:
-        """On Warp's CPU device."""
+        """An array on Warp's CPU device."""
         import warp as wp
 
         vectors = {
@@ -107,11 +107,11 @@ class WarpArrays(_OnWarpStream):
         return wp.array(array, device="cpu", copy=False, **dtype)
 
     def to_warp(self, array: Any, device: str) -> Any:
-        """As it is."""
+        """The array itself."""
         return array
 
     def from_warp(self, array: Any) -> Any:
-        """As it is, or its vectors as rows of two or three."""
+        """The array itself, or its vectors as rows of two or three numbers."""
         return array if self.vectors else _rows(array)
 
 
@@ -121,12 +121,12 @@ class TorchTensors:
     name = "torch"
 
     def device(self, array: Any) -> str | None:
-        """The tensor's."""
+        """The tensor's device."""
         index = array.device.index
         return str(array.device.type) if array.device.type == "cpu" else f"{array.device.type}:{index or 0}"
 
     def to_numpy(self, array: Any) -> NDArrayAny:
-        """A view."""
+        """A view of the tensor's memory."""
         found: NDArrayAny = array.detach().numpy()
         return found
 
@@ -135,7 +135,7 @@ class TorchTensors:
         return sys.modules["torch"].from_numpy(array)
 
     def to_warp(self, array: Any, device: str) -> Any:
-        """Over the same memory."""
+        """An array over the same memory."""
         import warp as wp
 
         return wp.from_torch(array.detach())
@@ -147,7 +147,7 @@ class TorchTensors:
         return wp.to_torch(array)
 
     def on_stream(self, device: str) -> contextlib.AbstractContextManager[Any]:
-        """PyTorch's current stream, so that no stream waits for another."""
+        """PyTorch's current stream, so that no stream has to wait for another."""
         if device == "cpu":
             return contextlib.nullcontext()
         import warp as wp
@@ -160,7 +160,7 @@ class TorchTensors:
 
 
 class DLPackArrays(_OnWarpStream):
-    """Arrays that speak DLPack, such as CuPy's and JAX's; the protocol makes streams wait for each other."""
+    """Arrays that support DLPack, such as CuPy's and JAX's; the protocol orders the streams."""
 
     def __init__(self, namespace: Any) -> None:
         """`namespace` is the module whose `from_dlpack` makes such arrays."""
@@ -168,50 +168,50 @@ class DLPackArrays(_OnWarpStream):
         self.namespace = namespace
 
     def device(self, array: Any) -> str | None:
-        """As the protocol says."""
+        """The device that the protocol names."""
         kind, index = array.__dlpack_device__()
         if kind in DLPACK_CPU:
             return "cpu"
         return f"cuda:{index}" if kind in DLPACK_CUDA else f"DLPack device {int(kind)}"
 
     def to_numpy(self, array: Any) -> NDArrayAny:
-        """A view, read-only."""
+        """A read-only view."""
         return np.from_dlpack(array)
 
     def from_numpy(self, array: NDArrayAny) -> Any:
-        """Over the same memory."""
+        """An array over the same memory."""
         return self.namespace.from_dlpack(array)
 
     def to_warp(self, array: Any, device: str) -> Any:
-        """Over the same memory."""
+        """An array over the same memory."""
         import warp as wp
 
         return wp.from_dlpack(array)
 
     def from_warp(self, array: Any) -> Any:
-        """Over the same memory."""
+        """An array over the same memory."""
         return self.namespace.from_dlpack(array)
 
 
 class CudaInterfaceArrays(_OnWarpStream):
-    """Arrays known only by `__cuda_array_interface__`: Warp arrays, which have it too, come back."""
+    """Arrays that have only `__cuda_array_interface__`. Results are Warp arrays, which have it as well."""
 
     name = "__cuda_array_interface__"
 
     def device(self, array: Any) -> str | None:
-        """The interface does not say."""
+        """None: the interface doesn't tell."""
         return None
 
     def to_numpy(self, array: Any) -> NDArrayAny:
-        """There is no such array in host memory."""
+        """TypeError: no such array is in host memory."""
         raise TypeError("an array with __cuda_array_interface__ is not in host memory")
 
     def from_numpy(self, array: NDArrayAny) -> Any:
-        """There is no such array in host memory."""
+        """TypeError: no such array is in host memory."""
         raise TypeError("an array with __cuda_array_interface__ is not in host memory")
 
     def to_warp(self, array: Any, device: str) -> Any:
-        """Over the same memory, once the stream that the interface names has written it."""
+        """An array over the same memory, ordered behind the stream that the interface names."""
         import warp as wp
 
         stream = array.__cuda_array_interface__.get("stream")
@@ -220,7 +220,7 @@ class CudaInterfaceArrays(_OnWarpStream):
         return wp.array(data=array, device=device, copy=False)
 
     def from_warp(self, array: Any) -> Any:
-        """Warp's array with vectors as rows."""
+        """The Warp array, with vectors as rows."""
         return _rows(array)
 
 
@@ -228,12 +228,12 @@ NUMPY = NumPyArrays()
 WARP_VECTORS, WARP_NUMBERS = WarpArrays(vectors=True), WarpArrays(vectors=False)
 TORCH = TorchTensors()
 CUDA_INTERFACE = CudaInterfaceArrays()
-# Known at a glance, which a call of one ray is glad of.
+# A quick test for these types avoids the library lookup, which matters for one-ray queries.
 NUMPY_TYPES = (np.ndarray, float, int, list, tuple, np.generic)
 
 
 def library_of(value: Any) -> Library:
-    """The library that `value` is an array of; NumPy for whatever is left."""
+    """The library that `value` is an array of; NumPy for values of no known library."""
     if isinstance(value, NUMPY_TYPES):
         return NUMPY
     torch, warp = sys.modules.get("torch"), sys.modules.get("warp")
@@ -249,12 +249,12 @@ def library_of(value: Any) -> Library:
 
 
 def lies_on(place: str | None, device: str) -> bool:
-    """Whether an array at `place` may lie on `device`; None, a place not told, is some CUDA device."""
+    """Whether an array at `place` may be on `device`; None (its library doesn't tell) is a CUDA device."""
     return device != "cpu" if place is None else place == device
 
 
 def host_array(name: str, value: Any) -> Any:
-    """`value` as an array that NumPy can read; ValueError where it is not in host memory."""
+    """`value` as an array that NumPy can read; ValueError if it is not in host memory."""
     library = library_of(value)
     place = library.device(value) or "a CUDA device"
     if place != "cpu":

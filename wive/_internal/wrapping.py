@@ -11,7 +11,7 @@ from wive._internal.arrays import Library
 
 
 class Wrapping(NamedTuple):
-    """How a backend's arrays become arrays of a library, and where they are computed."""
+    """How a backend's arrays become arrays of a library, and on which device they are computed."""
 
     library: Library
     device: str  # of the backend's arrays, by Warp's names
