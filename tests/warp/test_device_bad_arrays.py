@@ -104,6 +104,12 @@ def plain(values, dtype=float):
         ),
         (
             {"device": "cpu"},
+            lambda: (vec3(), 5.0),
+            ValueError,
+            "directions must have shape (n, 3), or (3,) if all rays share it, got ()",
+        ),
+        (
+            {"device": "cpu"},
             lambda: (wp.array(ROWS[None], dtype=wp.vec3, device="cpu"), vec3()),
             ValueError,
             "origins must have shape (n, 3), or (3,) if all rays share it, got (1, 4, 3)",

@@ -99,7 +99,8 @@ class RayLoader:
     def _vectors(self, name: str, value: Any, library: Library) -> tuple[Any, bool]:
         """(n,) vec3 and False, or the (1,) that all rays share and True."""
         if library is NUMPY:
-            return wp.full(1, self._vec3(*map(float, value)), dtype=self._vec3, device=self.device), True
+            shared = arguments.vectors(name, value, self._dtype).tolist()
+            return wp.full(1, self._vec3(*shared), dtype=self._vec3, device=self.device), True
         array = self._checked(name, value, library)
         if array.dtype is self._vec3 and array.ndim == 1:
             return array, False

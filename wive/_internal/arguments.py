@@ -145,8 +145,8 @@ def rays(
     A vector of shape (3,) is shared by all rays.
     """
     dtype = real.dtype
-    origin_rows = origins if _is_ready(origins, dtype) else _vectors("origins", origins, real)
-    direction_rows = directions if _is_ready(directions, dtype) else _vectors("directions", directions, real)
+    origin_rows = origins if _is_ready(origins, dtype) else vectors("origins", origins, real)
+    direction_rows = directions if _is_ready(directions, dtype) else vectors("directions", directions, real)
     if origin_rows.ndim == direction_rows.ndim == 1:
         origin_rows, direction_rows = origin_rows[None], direction_rows[None]
     elif origin_rows.ndim == 1:
@@ -166,7 +166,7 @@ def rays(
 
 def directions(value: ArrayLike, count: int, real: Real = FLOAT32) -> Floats:
     """The directions of `count` rays, (count,3) of `real`'s dtype, C-contiguous unless all rays share one."""
-    rows = value if _is_ready(value, real.dtype) else _vectors("directions", value, real)
+    rows = value if _is_ready(value, real.dtype) else vectors("directions", value, real)
     if rows.ndim == 1:
         return np.broadcast_to(rows, (count, 3))
     if len(rows) != count:
@@ -223,6 +223,16 @@ def lanes(value: object) -> Lanes | None:
     return 8 if value == 8 else 1
 
 
+def vectors(name: str, value: ArrayLike, real: Real) -> Floats:
+    """Vectors (n,3), or one (3,) that all rays share, of `real`'s dtype, C-contiguous."""
+    array = _numeric(name, value, "an (n, 3) array of real numbers", "fiu")
+    if array.shape == (0,):
+        array = array.reshape(0, 3)
+    if array.ndim not in (1, 2) or array.shape[-1] != 3:
+        raise ValueError(f"{name} must have shape (n, 3), or (3,) if all rays share it, got {array.shape}")
+    return real.array(array)
+
+
 def limits(name: str, value: ArrayLike, count: int, real: Real = FLOAT32) -> Floats:
     """The limits of `count` rays, (1,) or (count,) of `real`'s dtype."""
     array = _numeric(name, value, "a real number or one per ray", "fiu")
@@ -252,15 +262,6 @@ def _positions(vertices: ArrayLike) -> NDArray[Any]:
     if points.ndim != 2 or points.shape[1] != 3:
         raise ValueError(f"vertices must have shape (v, 3), got {points.shape}")
     return points
-
-
-def _vectors(name: str, value: ArrayLike, real: Real) -> Floats:
-    array = _numeric(name, value, "an (n, 3) array of real numbers", "fiu")
-    if array.shape == (0,):
-        array = array.reshape(0, 3)
-    if array.ndim not in (1, 2) or array.shape[-1] != 3:
-        raise ValueError(f"{name} must have shape (n, 3), or (3,) if all rays share it, got {array.shape}")
-    return real.array(array)
 
 
 def _numeric(
