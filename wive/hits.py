@@ -25,10 +25,8 @@ class Stats(NamedTuple):
     triangles: NDArray[np.int32]
 
 
-def stats_of(table: NDArray[np.int32] | None, library: Library) -> Stats | None:
+def stats_of(table: NDArray[np.int32], library: Library) -> Stats:
     """The columns of an (n,3) table of steps as arrays of that library."""
-    if table is None:
-        return None
     return Stats(*(library.from_numpy(np.ascontiguousarray(column)) for column in table.T))
 
 

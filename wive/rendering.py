@@ -97,7 +97,7 @@ def render_counted(
     frame = camera.frame(width, height)
     image = np.zeros((height, width, 3), np.float32)
     tracer = scene._tracer  # one picture shows one shape, whatever refits happen meanwhile
-    arguments.refuse_others_options(tracer.backend, tracer.options, threads=settings.threads)
+    arguments.refuse_lacking(tracer.backend, tracer.lacks, {"threads": settings.threads})
     render_rows = tracer.rows_renderer(frame, image, settings)
     rays = 0
     with progress_bar(height, "row", "rendering", show=progress) as advance:

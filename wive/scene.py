@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from wive import _cpu
 from wive._internal import arguments
-from wive._internal.arguments import LanesOption, Work
+from wive._internal.arguments import USUAL_WORK, USUAL_WORK_WITH_STATS, LanesOption, Work
 from wive._internal.arrays import host_array
 from wive._internal.cpu_tracer import CpuTracer
 from wive._internal.files import PathLike
@@ -334,7 +334,10 @@ class Scene:
         """Check a query's arguments; its answer, with the counters if `stats`."""
         tracer = self._tracer
         checked = check_rays(*rays, tracer.backend, tracer.device)
-        work = arguments.work(tracer.backend, tracer.options, threads, in_flight, lanes, stats)
+        if threads is None and in_flight is None and lanes == "auto":
+            work = USUAL_WORK_WITH_STATS if stats else USUAL_WORK
+        else:
+            work = arguments.work(tracer.backend, tracer.lacks, threads, in_flight, lanes, stats)
         answer, counters = query(checked, work)
         return answer if counters is None else (answer, counters)
 

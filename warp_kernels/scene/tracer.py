@@ -50,7 +50,7 @@ class WarpTracer:
     """The tree and the mesh on a device, and the queries that `wive.Scene` answers with them."""
 
     backend = "warp"
-    options = frozenset({"lanes"})
+    lacks = ("threads", "in_flight")
 
     def __init__(self, bvh: _cpu.Bvh, faces: NDArray[np.int32], device: str) -> None:
         """Copy tree and mesh to the device, and wait until they are there: queries may use any stream."""

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wive._internal.arguments import rays as checked_rays
-from wive._internal.arguments import refuse_others_options
+from wive._internal.arguments import refuse_lacking
 from wive._internal.files import atomic_write, check_output
 from wive._internal.npzfile import check_input, read_npy_or_npz
 from wive._internal.precision import Floats, Real, real_named
@@ -46,7 +46,7 @@ def trace_rays(options: Namespace) -> None:
     output = check_output(options.output, ".npz")
     check_input(options.rays)
     scene = _scene(options, *load_mesh(options.mesh, options.precision))
-    refuse_others_options(scene.backend, scene._tracer.options, threads=options.threads)
+    refuse_lacking(scene.backend, scene._tracer.lacks, {"threads": options.threads})
     origins, directions, tmin, tmax = _read_rays(options.rays, real_named(options.precision))
     count = len(origins)
     query = scene.intersect_all if options.all else scene.intersect

@@ -26,7 +26,7 @@ class CpuTracer:
     """The tree in host memory, and the kernels of one CPU backend."""
 
     device = None
-    options = frozenset({"threads", "in_flight"})
+    lacks = ("lanes",)
 
     def __init__(self, bvh: _cpu.Bvh, faces: NDArray[np.int32], backend: str) -> None:
         """Take the tree; the kernels are looked up by the first query."""
@@ -44,29 +44,39 @@ class CpuTracer:
 
     def intersect(self, rays: Rays, work: Work) -> tuple[Hits, Stats | None]:
         """Closest hits."""
-        t, prim, uv, steps = self.bvh.intersect(self._kernels, *self._given(rays, work))
+        t, prim, uv, steps = self.bvh.intersect(
+            self._kernels, *rays.numpy(self._real), work.threads, work.in_flight, work.stats
+        )
         hits = Hits(t, prim, uv, self.bvh.vertices, self._faces, rays, self._accuracy)
         if rays.library is not NUMPY:
             hits = WrappedHits(hits, _wrapping(rays))
-        return hits, stats_of(steps, rays.library)
+        return hits, None if steps is None else stats_of(steps, rays.library)
 
     def occluded(self, rays: Rays, work: Work) -> tuple[Any, Stats | None]:
         """(n,) bool, whether anything is hit."""
-        mask, steps = self.bvh.occluded(self._kernels, *self._given(rays, work))
-        return rays.library.from_numpy(mask), stats_of(steps, rays.library)
+        mask, steps = self.bvh.occluded(
+            self._kernels, *rays.numpy(self._real), work.threads, work.in_flight, work.stats
+        )
+        library = rays.library
+        return library.from_numpy(mask), None if steps is None else stats_of(steps, library)
 
     def count(self, rays: Rays, work: Work) -> tuple[Any, Stats | None]:
         """(n,) int32, the number of hits."""
-        counts, steps = self.bvh.count(self._kernels, *self._given(rays, work))
-        return rays.library.from_numpy(counts), stats_of(steps, rays.library)
+        counts, steps = self.bvh.count(
+            self._kernels, *rays.numpy(self._real), work.threads, work.in_flight, work.stats
+        )
+        library = rays.library
+        return library.from_numpy(counts), None if steps is None else stats_of(steps, library)
 
     def intersect_all(self, rays: Rays, work: Work) -> tuple[AllHits, Stats | None]:
         """All hits."""
-        offsets, t, prim, uv, steps = self.bvh.intersect_all(self._kernels, *self._given(rays, work))
+        offsets, t, prim, uv, steps = self.bvh.intersect_all(
+            self._kernels, *rays.numpy(self._real), work.threads, work.in_flight, work.stats
+        )
         hits = AllHits(offsets, t, prim, uv, self.bvh.vertices, self._faces)
         if rays.library is not NUMPY:
             hits = WrappedAllHits(hits, _wrapping(rays))
-        return hits, stats_of(steps, rays.library)
+        return hits, None if steps is None else stats_of(steps, rays.library)
 
     def refitted(self, vertices: Floats) -> CpuTracer:
         """A tracer of moved vertices, as many as before."""
@@ -89,10 +99,6 @@ class CpuTracer:
             )
 
         return render_rows
-
-    def _given(self, rays: Rays, work: Work) -> tuple[Floats, Floats, Floats, Floats, int, int, bool]:
-        """What every query of the core takes behind its kernels."""
-        return *rays.numpy(self._real), work.threads, work.in_flight, work.stats
 
 
 def _wrapping(rays: Rays) -> Wrapping:

@@ -33,8 +33,8 @@ class Tracer(Protocol):
         """The Warp device; None for CPU backends."""
 
     @property
-    def options(self) -> frozenset[str]:
-        """The options that this backend has and others don't."""
+    def lacks(self) -> tuple[str, ...]:
+        """The options of queries that this backend doesn't have."""
 
     @property
     def bvh(self) -> _cpu.Bvh:
