@@ -226,6 +226,25 @@ def test_queries_neither_copy_rays_nor_touch_them(device):
             assert array.ptr == (origin.ctypes.data if given is RAYS else origin.ptr)
 
 
+@pytest.mark.parametrize("query", ["intersect", "occluded", "count", "intersect_all"])
+def test_the_library_of_each_array_is_looked_up_once(scene, backend, device, monkeypatch, query):
+    from wive._internal import arrays
+    from wive.warp_kernels.scene import rays as warp_rays
+
+    looked_up = []
+
+    def library_of(value):
+        looked_up.append(value)
+        return arrays.library_of(value)
+
+    for module in (wive._internal.rays, warp_rays):
+        monkeypatch.setattr(module, "library_of", library_of)
+    place = device if backend == "warp" else "cpu"
+    rays = [wp.array(rows, dtype=wp.vec3, device=place) for rows in RAYS]
+    getattr(scene, query)(*rays, 0.0, 1.0)
+    assert len(looked_up) == 4
+
+
 def test_hits_on_a_device_keep_what_they_are_made_of(device):
     hits = wive.Scene(*MESH, device=device).intersect(
         *(wp.array(rows, dtype=wp.vec3, device=device) for rows in RAYS)
