@@ -17,21 +17,17 @@ import pytest
 
 wp = pytest.importorskip("warp")
 
-from wive.warp_kernels.launching import kernels, kernels_all, sorting  # noqa: E402
-from wive.warp_kernels.launching.launch import default_block_dim  # noqa: E402
+from wive.warp_kernels.launching import sorting
+from wive.warp_kernels.launching.kernels import make_kernel
+from wive.warp_kernels.launching.launch import default_block_dim
 
 ARCHITECTURES = (80, 90, 100)
 STACK = 96
-KERNELS = {
-    "closest": kernels.closest_kernel,
-    "any": kernels.any_kernel,
-    "count": kernels_all.count_kernel,
-    "all": kernels_all.all_kernel,
-}
+QUERIES = ("closest", "any", "count", "all")
 
 # Every query on one architecture, and on the others those two that hold nearly all there is to compile; exact
 # trees, which take longest, on one architecture.
-_BUILDS = [(query, 90) for query in KERNELS] + [
+_BUILDS = [(query, 90) for query in QUERIES] + [
     (query, architecture)
     for query in ("closest", "any")
     for architecture in ARCHITECTURES
@@ -41,11 +37,11 @@ EXACT_QUERIES = ("closest", "count")
 BUILDS = [(*build, accuracy) for build in _BUILDS for accuracy in ("fast", "watertight")] + [
     (query, 90, "exact") for query in EXACT_QUERIES
 ]
-COMPRESSED_BUILDS = [(query, accuracy) for query in KERNELS for accuracy in ("fast", "watertight")] + [
+COMPRESSED_BUILDS = [(query, accuracy) for query in QUERIES for accuracy in ("fast", "watertight")] + [
     (query, "exact") for query in EXACT_QUERIES
 ]
 DOUBLE_BUILDS = [
-    (query, 90, accuracy, "float32") for query in KERNELS for accuracy in ("fast", "watertight")
+    (query, 90, accuracy, "float32") for query in QUERIES for accuracy in ("fast", "watertight")
 ] + [
     ("closest", 80, "watertight", "float32"),
     ("closest", 100, "watertight", "float32"),
@@ -61,7 +57,7 @@ REGISTERS = {
     ("exact", 8): 128,
     ("exact", 1): 112,
 }
-# The same of compressed nodes: unpacking takes a few.
+# With compressed nodes: unpacking takes a few.
 COMPRESSED_REGISTERS = {
     ("fast", 8): 96,
     ("watertight", 8): 112,
@@ -70,7 +66,7 @@ COMPRESSED_REGISTERS = {
     ("exact", 8): 128,
     ("exact", 1): 120,
 }
-# The same of float64 scenes, in either form of nodes.
+# In float64 scenes, in either node form.
 DOUBLE_REGISTERS = {
     ("fast", 8): 152,
     ("watertight", 8): 144,
@@ -163,7 +159,7 @@ def assemble(ptx: str, architecture: int, folder: Path) -> Usage:
 def test_kernel_compiles_for_cuda_within_its_limits(
     query: str, architecture: int, accuracy: str, lanes: int, tmp_path: Path
 ) -> None:
-    kernel = KERNELS[query](accuracy, lanes, STACK)
+    kernel = make_kernel(query, accuracy, lanes, STACK)
     kernel.module.options["block_dim"] = default_block_dim(lanes)
     ptx = compiled_ptx(kernel.module, architecture, tmp_path)
     # The CUDA branches are what was compiled: the collectives of a group, wide loads of a thread.
@@ -181,7 +177,7 @@ def test_kernel_compiles_for_cuda_within_its_limits(
 def test_kernel_for_compressed_nodes_compiles_within_its_limits(
     query: str, accuracy: str, lanes: int, tmp_path: Path
 ) -> None:
-    kernel = KERNELS[query](accuracy, lanes, STACK, nodes="compressed")
+    kernel = make_kernel(query, accuracy, lanes, STACK, nodes="compressed")
     kernel.module.options["block_dim"] = default_block_dim(lanes)
     usage = assemble(compiled_ptx(kernel.module, 90, tmp_path), 90, tmp_path)
     assert usage.spills == 0
@@ -195,7 +191,7 @@ def test_kernel_for_compressed_nodes_compiles_within_its_limits(
 def test_kernel_for_float64_scenes_compiles_within_its_limits(
     query: str, architecture: int, accuracy: str, nodes: str, lanes: int, tmp_path: Path
 ) -> None:
-    kernel = KERNELS[query](accuracy, lanes, STACK, nodes=nodes, precision="float64")
+    kernel = make_kernel(query, accuracy, lanes, STACK, nodes=nodes, precision="float64")
     kernel.module.options["block_dim"] = default_block_dim(lanes)
     ptx = compiled_ptx(kernel.module, architecture, tmp_path)
     assert ("ld.global.nc.v2.f64" in ptx) == (lanes == 8)
@@ -211,7 +207,7 @@ def test_kernel_with_counters_compiles_for_cuda(lanes: int, tmp_path: Path) -> N
     for query in ("closest", "any", "count"):
         folder = tmp_path / query
         folder.mkdir()
-        compiled_ptx(KERNELS[query]("watertight", lanes, STACK, True).module, 90, folder)
+        compiled_ptx(make_kernel(query, "watertight", lanes, STACK, True).module, 90, folder)
 
 
 @pytest.mark.timeout(120)

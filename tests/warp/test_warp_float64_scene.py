@@ -7,11 +7,11 @@ import pytest
 
 wp = pytest.importorskip("warp")
 
-from support.doubles import rays64, soup64, survey  # noqa: E402
-from support.foreign_arrays import Foreign  # noqa: E402
-from support.meshes import assert_same_hits  # noqa: E402
+from support.doubles import rays64, soup64, survey
+from support.foreign_arrays import Foreign
+from support.meshes import assert_same_hits
 
-import wive  # noqa: E402
+import wive
 
 pytestmark = pytest.mark.timeout(180)
 

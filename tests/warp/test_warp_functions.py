@@ -10,88 +10,47 @@ import pytest
 
 wp = pytest.importorskip("warp")
 
-from support.meshes import random_rays, soup  # noqa: E402
-from support.warp_launches import INFINITE, ZERO, Answers, assert_bit_identical, cpu_answers  # noqa: E402
+from support.meshes import random_rays, soup
+from support.warp_launches import INFINITE, ZERO, Answers, assert_bit_identical, cpu_answers
 
-from wive import _cpu, warp_kernels  # noqa: E402
+from wive import _cpu, warp_kernels
 
 pytestmark = pytest.mark.timeout(120)
 
 
-@wp.kernel
-def trace_watertight(
-    bvh: warp_kernels.Bvh,
-    origins: wp.array(dtype=wp.vec3),
-    directions: wp.array(dtype=wp.vec3),
-    hits: wp.array(dtype=warp_kernels.Hit),
-    occluded: wp.array(dtype=wp.bool),
-):
-    i = wp.tid()
-    hits[i] = warp_kernels.closest_hit(bvh, origins[i], directions[i], 0.0, wp.inf)
-    occluded[i] = warp_kernels.any_hit(bvh, origins[i], directions[i], 0.0, wp.inf)
+HANDLES = {"watertight": warp_kernels.Bvh, "fast": warp_kernels.FastBvh, "exact": warp_kernels.ExactBvh}
 
 
-@wp.kernel
-def trace_fast(
-    bvh: warp_kernels.FastBvh,
-    origins: wp.array(dtype=wp.vec3),
-    directions: wp.array(dtype=wp.vec3),
-    hits: wp.array(dtype=warp_kernels.Hit),
-    occluded: wp.array(dtype=wp.bool),
-):
-    i = wp.tid()
-    hits[i] = warp_kernels.closest_hit(bvh, origins[i], directions[i], 0.0, wp.inf)
-    occluded[i] = warp_kernels.any_hit(bvh, origins[i], directions[i], 0.0, wp.inf)
+def make_kernels(handle: type) -> tuple[wp.Kernel, wp.Kernel]:
+    """A user's kernels for one type of handle."""
+
+    @wp.kernel
+    def trace(
+        bvh: handle,
+        origins: wp.array(dtype=wp.vec3),
+        directions: wp.array(dtype=wp.vec3),
+        hits: wp.array(dtype=warp_kernels.Hit),
+        occluded: wp.array(dtype=wp.bool),
+    ):
+        i = wp.tid()
+        hits[i] = warp_kernels.closest_hit(bvh, origins[i], directions[i], 0.0, wp.inf)
+        occluded[i] = warp_kernels.any_hit(bvh, origins[i], directions[i], 0.0, wp.inf)
+
+    @wp.kernel
+    def count(
+        bvh: handle,
+        origins: wp.array(dtype=wp.vec3),
+        directions: wp.array(dtype=wp.vec3),
+        counts: wp.array(dtype=wp.int32),
+    ):
+        i = wp.tid()
+        counts[i] = warp_kernels.count_hits(bvh, origins[i], directions[i], 0.25, 1.5)
+
+    return trace, count
 
 
-@wp.kernel
-def count_watertight(
-    bvh: warp_kernels.Bvh,
-    origins: wp.array(dtype=wp.vec3),
-    directions: wp.array(dtype=wp.vec3),
-    counts: wp.array(dtype=wp.int32),
-):
-    i = wp.tid()
-    counts[i] = warp_kernels.count_hits(bvh, origins[i], directions[i], 0.25, 1.5)
-
-
-@wp.kernel
-def count_fast(
-    bvh: warp_kernels.FastBvh,
-    origins: wp.array(dtype=wp.vec3),
-    directions: wp.array(dtype=wp.vec3),
-    counts: wp.array(dtype=wp.int32),
-):
-    i = wp.tid()
-    counts[i] = warp_kernels.count_hits(bvh, origins[i], directions[i], 0.25, 1.5)
-
-
-@wp.kernel
-def trace_exact(
-    bvh: warp_kernels.ExactBvh,
-    origins: wp.array(dtype=wp.vec3),
-    directions: wp.array(dtype=wp.vec3),
-    hits: wp.array(dtype=warp_kernels.Hit),
-    occluded: wp.array(dtype=wp.bool),
-):
-    i = wp.tid()
-    hits[i] = warp_kernels.closest_hit(bvh, origins[i], directions[i], 0.0, wp.inf)
-    occluded[i] = warp_kernels.any_hit(bvh, origins[i], directions[i], 0.0, wp.inf)
-
-
-@wp.kernel
-def count_exact(
-    bvh: warp_kernels.ExactBvh,
-    origins: wp.array(dtype=wp.vec3),
-    directions: wp.array(dtype=wp.vec3),
-    counts: wp.array(dtype=wp.int32),
-):
-    i = wp.tid()
-    counts[i] = warp_kernels.count_hits(bvh, origins[i], directions[i], 0.25, 1.5)
-
-
-COUNTERS = {"watertight": count_watertight, "fast": count_fast, "exact": count_exact}
-KERNELS = {"watertight": trace_watertight, "fast": trace_fast, "exact": trace_exact}
+KERNELS = {accuracy: make_kernels(handle) for accuracy, handle in HANDLES.items()}
+trace_watertight, _ = KERNELS["watertight"]
 
 
 def trace(kernel: wp.Kernel, tree: warp_kernels.Tree, rays: tuple[np.ndarray, np.ndarray]) -> Answers:
@@ -111,14 +70,14 @@ def test_functions_in_a_users_kernel_give_the_bits_of_the_core(accuracy: str) ->
     rays = random_rays(2000, 2, 0.0, 1.0)
     rays[1][::100] = 0
     tree = warp_kernels.upload(bvh, "cpu")
-    found = trace(KERNELS[accuracy], tree, rays)
+    found = trace(KERNELS[accuracy][0], tree, rays)
     warp_kernels.check(tree)
     assert_bit_identical(
         found, cpu_answers(bvh, "scalar", *rays, ZERO, INFINITE), ("t", "prim", "uv", "occluded")
     )
 
 
-@pytest.mark.parametrize("accuracy", COUNTERS)
+@pytest.mark.parametrize("accuracy", KERNELS)
 def test_hits_counted_in_a_users_kernel_are_those_of_the_core(accuracy: str) -> None:
     bvh = _cpu.Bvh(*soup(3000, 1), accuracy)
     rays = random_rays(2000, 2, 0.0, 1.0)
@@ -126,7 +85,7 @@ def test_hits_counted_in_a_users_kernel_are_those_of_the_core(accuracy: str) -> 
     tree = warp_kernels.upload(bvh, "cpu")
     counts = wp.zeros(2000, dtype=wp.int32, device="cpu")
     vectors = [wp.array(a, dtype=wp.vec3, device="cpu") for a in rays]
-    wp.launch(COUNTERS[accuracy], 2000, inputs=[tree.handle, *vectors, counts], device="cpu")
+    wp.launch(KERNELS[accuracy][1], 2000, inputs=[tree.handle, *vectors, counts], device="cpu")
     warp_kernels.check(tree)
     assert expected.max() > 5
     np.testing.assert_array_equal(counts.numpy(), expected)

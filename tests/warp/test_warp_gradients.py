@@ -5,45 +5,41 @@ import pytest
 
 wp = pytest.importorskip("warp")
 
-from support.meshes import sphere  # noqa: E402
+from support.meshes import sphere
 
-from wive import _cpu, warp_kernels  # noqa: E402
+from wive import _cpu, warp_kernels
 
 pytestmark = pytest.mark.timeout(120)
 
 
-@wp.kernel
-def weigh_watertight(
-    bvh: warp_kernels.Bvh,
-    vertices: wp.array(dtype=wp.vec3),
-    faces: wp.array(dtype=wp.vec3i),
-    origins: wp.array(dtype=wp.vec3),
-    directions: wp.array(dtype=wp.vec3),
-    loss: wp.array(dtype=wp.float32),
-):
-    i = wp.tid()
-    hit = warp_kernels.differentiable_hit(bvh, vertices, faces, origins[i], directions[i], 0.0, wp.inf)
-    if hit.prim >= 0:
-        loss[i] = hit.t + wp.dot(wp.vec3(0.5, -1.0, 2.0), hit.point)
+def weighing_kernel(handle: type) -> wp.Kernel:
+    """A kernel whose loss depends on t and the point, for one type of handle."""
+
+    @wp.kernel
+    def weigh(
+        bvh: handle,
+        vertices: wp.array(dtype=wp.vec3),
+        faces: wp.array(dtype=wp.vec3i),
+        origins: wp.array(dtype=wp.vec3),
+        directions: wp.array(dtype=wp.vec3),
+        loss: wp.array(dtype=wp.float32),
+    ):
+        i = wp.tid()
+        hit = warp_kernels.differentiable_hit(bvh, vertices, faces, origins[i], directions[i], 0.0, wp.inf)
+        if hit.prim >= 0:
+            loss[i] = hit.t + wp.dot(wp.vec3(0.5, -1.0, 2.0), hit.point)
+
+    return weigh
 
 
-@wp.kernel
-def weigh_fast(
-    bvh: warp_kernels.FastBvh,
-    vertices: wp.array(dtype=wp.vec3),
-    faces: wp.array(dtype=wp.vec3i),
-    origins: wp.array(dtype=wp.vec3),
-    directions: wp.array(dtype=wp.vec3),
-    loss: wp.array(dtype=wp.float32),
-):
-    i = wp.tid()
-    hit = warp_kernels.differentiable_hit(bvh, vertices, faces, origins[i], directions[i], 0.0, wp.inf)
-    if hit.prim >= 0:
-        loss[i] = hit.t + wp.dot(wp.vec3(0.5, -1.0, 2.0), hit.point)
+KERNELS = {
+    "watertight": weighing_kernel(warp_kernels.Bvh),
+    "fast": weighing_kernel(warp_kernels.FastBvh),
+}
 
 
 def exact_loss(triangle: np.ndarray, origin: np.ndarray, direction: np.ndarray) -> float:
-    """The same in float64 on one triangle."""
+    """The kernel's loss in float64 on one triangle."""
     normal = np.cross(triangle[1] - triangle[0], triangle[2] - triangle[0])
     t = normal @ (triangle[0] - origin) / (normal @ direction)
     return float(t + np.array([0.5, -1.0, 2.0]) @ (origin + t * direction))
@@ -63,7 +59,7 @@ def slopes(triangle: np.ndarray, origin: np.ndarray, direction: np.ndarray, whic
     return result
 
 
-@pytest.mark.parametrize("accuracy", ["watertight", "fast"])
+@pytest.mark.parametrize("accuracy", KERNELS)
 def test_gradients_of_distance_and_point_are_those_of_finite_differences(accuracy: str) -> None:
     vertices, faces = sphere(1)
     random = np.random.default_rng(5)
@@ -80,9 +76,10 @@ def test_gradients_of_distance_and_point_are_those_of_finite_differences(accurac
         wp.array(directions, dtype=wp.vec3, device="cpu", requires_grad=True),
     ]
     loss = wp.zeros(len(origins), dtype=wp.float32, device="cpu", requires_grad=True)
-    kernel = weigh_fast if accuracy == "fast" else weigh_watertight
     with wp.Tape() as tape:
-        wp.launch(kernel, len(origins), inputs=[tree.handle, *arrays], outputs=[loss], device="cpu")
+        wp.launch(
+            KERNELS[accuracy], len(origins), inputs=[tree.handle, *arrays], outputs=[loss], device="cpu"
+        )
     tape.backward(grads={loss: wp.ones_like(loss)})
     warp_kernels.check(tree)
     got = [tape.gradients[arrays[i]].numpy() for i in (0, 2, 3)]

@@ -1,13 +1,15 @@
 """A tree whose memory was overwritten ends in an error, never in a hang; launches refuse what can't run."""
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 
 wp = pytest.importorskip("warp")
 
-from support.meshes import random_rays, sphere  # noqa: E402
+from support.meshes import random_rays, sphere
 
-from wive import _cpu, warp_kernels  # noqa: E402
+from wive import _cpu, warp_kernels
 
 pytestmark = pytest.mark.timeout(60)
 
@@ -70,11 +72,34 @@ def test_hits_that_were_counted_but_are_no_longer_found_are_misses(
     assert np.isinf(listed[0].numpy().reshape(32, 3)[:, 1:]).all()
 
 
-def test_block_size_that_splits_a_ray_is_refused() -> None:
+# Each launch and how many arrays it takes.
+LAUNCHES = [
+    (warp_kernels.launch_closest, 7),
+    (warp_kernels.launch_any, 5),
+    (warp_kernels.launch_count, 5),
+    (warp_kernels.launch_all, 9),
+]
+
+
+@pytest.mark.parametrize(("launch", "arrays"), LAUNCHES)
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"lanes": 1, "block_dim": 12}, "block_dim: expected a multiple of 8 with lanes=1, got 12"),
+        ({"lanes": 8, "block_dim": 0}, "block_dim: expected 1 to 1024 threads, got 0"),
+        ({"lanes": 1, "block_dim": -8}, "block_dim: expected 1 to 1024 threads, got -8"),
+        ({"lanes": 8, "block_dim": 1032}, "block_dim: expected 1 to 1024 threads, got 1032"),
+        ({"lanes": 4}, "lanes: expected 8 or 1, got 4"),
+        ({"lanes": 0}, "lanes: expected 8 or 1, got 0"),
+    ],
+)
+def test_lanes_and_block_sizes_out_of_range_are_refused(
+    launch: Callable[..., None], arrays: int, options: dict[str, int], message: str
+) -> None:
     tree = warp_kernels.upload(_cpu.Bvh(*sphere(1)), "cpu")
     array = wp.zeros(1, dtype=wp.vec3, device="cpu")
-    with pytest.raises(ValueError, match="block_dim: expected a multiple of 8 with lanes=1, got 12"):
-        warp_kernels.launch_any(tree, array, array, array, array, array, lanes=1, block_dim=12)
+    with pytest.raises(ValueError, match=message):
+        launch(tree, *[array] * arrays, **options)
 
 
 def test_settings_of_warp_are_left_as_they_were() -> None:

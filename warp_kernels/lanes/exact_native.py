@@ -1,18 +1,15 @@
 """Native code of the exact triangle test: the filter of triangle_exact.h, and the core's own integers.
 
-The text of the integers is compiled into `wive._cpu`, which gives it to both sides, so there is one of it.
+The C++ text of the integers is `_cpu.exact_source`, the same that the core is compiled from.
 """
-
-# mypy: ignore-errors
-# Warp compiles these functions: to mypy they are no Python.
 
 import warp as wp
 
 from wive import _cpu
 
-# A triangle is given by the words at which its vertices begin, their axes `stride` words apart.
+# Triangles are passed as the words at which their vertices begin, axes `stride` words apart.
 
-# One triangle against the ray's line in double, as cpu/traverse/triangle_exact.h. The error is that of
+# One triangle against the ray's line in double, as cpu/traverse/triangle_exact.h. The error is derived in
 # docs/accuracy.md; fused multiply-adds only make it smaller.
 _FILTER = """
     struct Filter {
@@ -47,8 +44,8 @@ _FILTER = """
     };
 """
 
-# NaN, an unused lane of a float32 block, passes no comparison.
-_MAY_MEET = (
+# NaN, which unused lanes of a float32 block hold, passes no comparison.
+_MAY_HIT = (
     _FILTER
     + """
     const Filter filter((const float*)units, at, stride, axes, origin, shear_x, shear_y);
@@ -66,7 +63,7 @@ _SETUP = (
 """
 )
 
-# t, u, v and 1, or a miss: 0 last.
+# t, u, v and 1; on a miss the last is 0.
 _SOLVE = (
     _FILTER
     + """
@@ -88,8 +85,8 @@ _SOLVE = (
         const float below = (float)(values[i] - errors[i]), above = (float)(values[i] + errors[i]);
         doubt = doubt || !(below == above);
         hit[i] = below + 0.0f;
-        // Most doubts are about where a ray meets the surface that it leaves from, which does not matter.
-        if (i == 0 && !on_edge && (above < tmin || below > farthest)) {
+        // Most doubts are about hits on the surface that a ray leaves from, outside its limits.
+        if (i == 0 && !on_edge && (above < tmin || below > farthest_t)) {
             hit[3] = 0.0f;
             return hit;
         }
@@ -100,7 +97,7 @@ _SOLVE = (
     + _SETUP
     + """
     const ExactIntersection meeting(from, way, corners, ExactIntersection::unit_of(from, corners));
-    hit[3] = (crossings ? meeting.hit_perturbed : meeting.hit) ? 1.0f : 0.0f;
+    hit[3] = (perturb_edges ? meeting.hit_perturbed : meeting.hit) ? 1.0f : 0.0f;
     if (hit[3] == 0.0f) return hit;
     hit[0] = meeting.t();
     hit[1] = meeting.u();
@@ -109,8 +106,8 @@ _SOLVE = (
 """
 )
 
-# Rounding keeps order, so only where t rounds to a limit can it have crossed it. t is finite, limits need
-# not be.
+# Rounding keeps order, so the exact t can be beyond a limit that t is within only if t equals that limit. t
+# is finite; limits need not be.
 _WITHIN = (
     """
     if (t < tmin || t > tmax) return false;
@@ -135,8 +132,8 @@ _COMPARE = (
 )
 
 
-@wp.func_native(_MAY_MEET)
-def may_meet(
+@wp.func_native(_MAY_HIT)
+def may_hit(
     units: wp.uint64,
     at: wp.vec3i,
     stride: int,
@@ -145,7 +142,7 @@ def may_meet(
     shear_x: wp.float64,
     shear_y: wp.float64,
 ) -> bool:
-    """Whether the ray's line is not certain to miss a triangle."""
+    """Whether the ray's line may hit a triangle: false only if it certainly misses."""
     ...
 
 
@@ -161,12 +158,13 @@ def solve_exactly(
     shear_y: wp.float64,
     inverse: wp.float64,
     tmin: float,
-    farthest: float,
-    crossings: bool,
+    farthest_t: float,
+    perturb_edges: bool,
 ) -> wp.vec4:
-    """t, u and v of a triangle, correctly rounded, and 1; a 0 last where the line misses it.
+    """t, u and v of a triangle, correctly rounded, and 1; the last is 0 if the line misses the triangle.
 
-    Or where it certainly meets it outside [tmin, farthest]; what is in doubt there is not missed.
+    It is 0 also if t is certainly outside [tmin, farthest_t]. perturb_edges: a line through an edge or vertex
+    hits one of the triangles there, as if its origin were moved by an infinitely small amount.
     """
     ...
 

@@ -1,13 +1,14 @@
-"""The lanes of a node and what they do together: the only code that knows how a ray's lanes lie on threads.
+"""The two lane forms: vectors and collectives for the eight lanes of a node.
 
-lanes=8: one thread owns all eight lanes as vectors of length eight, and the stack is its own.
-lanes=1: eight threads own one lane each. On CUDA they talk by warp intrinsics and share a stack in shared
-memory; on Warp's CPU device they are fibers of a block, which run one at a time and change over at a barrier,
-so that a static buffer between two barriers is all they need.
+The lane form says how the eight lanes of a node are spread over threads, and is named by its vector length:
+
+- lanes=8: one thread per ray owns all eight lanes as vectors of length eight, and its stack is a local array.
+- lanes=1: eight threads per ray, a group, own one lane each. On CUDA they communicate by warp intrinsics and
+  share a stack in shared memory. On Warp's CPU device they are fibers of a block, which run one at a time and
+  switch at barriers, so a static buffer between two barriers serves for both.
+
+Code outside this folder is written once for both forms.
 """
-
-# mypy: ignore-errors
-# Warp compiles these functions: to mypy they are no Python.
 
 import functools
 from types import SimpleNamespace
@@ -26,6 +27,7 @@ from wive.warp_kernels.lanes.native import (
     ROW_1,
     ROW_8,
     SYNC,
+    TRIANGLES_1,
     TRIANGLES_4,
     shared_stack_code,
 )
@@ -33,13 +35,13 @@ from wive.warp_kernels.lanes.native import (
 
 @wp.func_native("""
 #if defined(__CUDA_ARCH__)
-    return __ffs(lanes) - 1;
+    return __ffs(mask) - 1;
 #else
-    return __builtin_ctz(lanes);
+    return __builtin_ctz(mask);
 #endif
 """)
-def lowest_lane(lanes: wp.uint32) -> int:
-    """The lowest bit set in lanes, which must not be zero."""
+def lowest_lane(mask: wp.uint32) -> int:
+    """The lowest bit set in a mask, which must not be zero."""
     ...
 
 
@@ -51,7 +53,7 @@ def lowest_lane(lanes: wp.uint32) -> int:
 #endif
 """)
 def load_float(units: wp.uint64, at: int) -> float:
-    """One word of the tree as it is."""
+    """One word of the tree, bits unchanged."""
     ...
 
 
@@ -64,30 +66,30 @@ def load_float(units: wp.uint64, at: int) -> float:
 #endif
 """)
 def load_double(units: wp.uint64, at: int) -> wp.float64:
-    """The number that two words of the tree hold."""
+    """The number stored in two words of the tree."""
     ...
 
 
 @wp.func_native(PRODUCT.replace("ROUNDED", "__fmul_rn"))
 def product(a: float, b: float) -> float:
-    """a b, rounded."""
+    """a b, rounded: never fused with an addition."""
     ...
 
 
 @wp.func_native(PRODUCT.replace("ROUNDED", "__dmul_rn"))
 def product_double(a: wp.float64, b: wp.float64) -> wp.float64:
-    """a b, rounded."""
+    """a b, rounded: never fused with an addition."""
     ...
 
 
 @wp.func_native("return (wp::uint64)units.data;")
 def address_of(units: wp.array(dtype=wp.float32)) -> wp.uint64:
-    """Where the tree begins: one register to hand on, where the array would be a dozen."""
+    """Address of the tree: one register to pass on instead of an array's dozen."""
     ...
 
 
 def without_gradient(function: wp.Function) -> wp.Function:
-    """Keep Warp from building the function's adjoint: with references in its arguments it can't have one."""
+    """Keep Warp from building the function's adjoint, which functions with reference arguments can't have."""
     function.is_differentiable = False
     function.adj.skip_reverse_codegen = True
     return function
@@ -119,126 +121,72 @@ def _nothing():
 def _sync_group(): ...
 
 
-def reductions(length: int) -> tuple[wp.Function, wp.Function]:
-    """The or and the minimum of what each thread of a ray holds, the same for all of them."""
-    return (_same, _same) if length == 8 else (_or_of_group, _min_of_group)
-
-
-def sum_reduction(length: int) -> wp.Function:
-    """The sum of what each thread of a ray holds, the same for all of them."""
-    return _same if length == 8 else _sum_of_group
-
-
-@functools.cache
-def lanes_of(
-    length: int, stack: int, distances: bool, kept: int, precision: str = "float32"
-) -> SimpleNamespace:
-    """The lane vectors and collectives for vectors of `length` lanes; those of triangles are of `precision`.
-
-    The stack holds `stack` children and, where `distances` is true, as many distances behind them. It is the
-    thread's own vector, or the address of the group's piece of memory. Behind all that it has room for `kept`
-    words.
-    """
-    words = stack * (2 if distances else 1) + kept
-    return _eight_lanes(words, precision) if length == 8 else _one_lane(words, precision)
-
-
-def _products_code(length: int, precision: str) -> str:
-    """The native code of `products`."""
-    rounded = "__fmul_rn" if precision == "float32" else "__dmul_rn"
-    return PRODUCTS.replace("LENGTH", str(length)).replace("REAL", precision).replace("ROUNDED", rounded)
-
-
-def _eight_lanes(stack_words: int, precision: str) -> SimpleNamespace:
-    vector = wp.types.vector(length=8, dtype=wp.float32)
-    words = wp.types.vector(length=8, dtype=wp.uint32)
-    triangles = wp.types.vector(length=4, dtype=getattr(wp, precision))
-    stack_type = wp.types.vector(length=stack_words, dtype=wp.uint32)
-
-    @wp.func_native(DISTANCES_8)
-    def plane_distances(units: wp.uint64, at: int, lane: int, rdir: float, bias: float) -> vector: ...
-
-    @wp.func_native(ROW_8)
-    def load_row(units: wp.uint64, at: int, lane: int) -> words: ...
-
-    @wp.func_native(_products_code(4, precision))
-    def products(a: triangles, b: triangles) -> triangles: ...
-
-    @wp.func_native(TRIANGLES_4 if precision == "float32" else DOUBLE_TRIANGLES_4)
-    def load_triangles(units: wp.uint64, at: int, lane: int) -> triangles: ...
-
-    @wp.func_native("stack[at] = word;")
-    def store_word(stack: wp.ref[stack_type], at: int, word: wp.uint32): ...
-
-    @wp.func_native("return stack[at];")
-    def load_word(stack: wp.ref[stack_type], at: int) -> wp.uint32: ...
-
+def collectives(length: int) -> SimpleNamespace:
+    """The or, minimum and sum over the threads of a ray, each returned to all of them, and their barrier."""
+    if length == 8:
+        return SimpleNamespace(or_reduce=_same, min_reduce=_same, sum_reduce=_same, sync=_nothing)
     return SimpleNamespace(
-        length=8,
-        block_step=1,
-        new_stack=stack_type,
-        vector=vector,
-        words=words,
-        triangles=triangles,
-        triangles_length=4,
-        plane_distances=plane_distances,
-        load_row=load_row,
-        load_triangles=load_triangles,
-        products=products,
-        or_reduce=_same,
-        min_reduce=_same,
-        sync=_nothing,
-        stack_argument=wp.ref[stack_type],
-        store_word=without_gradient(store_word),
-        load_word=without_gradient(load_word),
+        or_reduce=_or_of_group, min_reduce=_min_of_group, sum_reduce=_sum_of_group, sync=_sync_group
     )
 
 
-def _one_lane(stack_words: int, precision: str) -> SimpleNamespace:
-    vector = wp.types.vector(length=1, dtype=wp.float32)
-    words = wp.types.vector(length=1, dtype=wp.uint32)
-    triangles = wp.types.vector(length=1, dtype=getattr(wp, precision))
-    load_number = load_float if precision == "float32" else load_double
-    number_words: int = 1 if precision == "float32" else 2
+@functools.cache
+def lanes_of(length: int, stack_words: int, precision: str) -> SimpleNamespace:
+    """Vectors, loads, collectives and the stack of a lane form.
 
-    @wp.func_native(DISTANCES_1)
+    length: lanes of a node per thread, 8 or 1. Vectors over a block's triangles have half as many lanes, at
+    least one, and numbers of `precision`. stack_words: words that the stack has room for.
+    """
+    eight = length == 8
+    triangles_length = 4 if eight else 1
+    c_type, rounded = {"float32": ("float", "__fmul_rn"), "float64": ("double", "__dmul_rn")}[precision]
+    vector = wp.types.vector(length=length, dtype=wp.float32)
+    words = wp.types.vector(length=length, dtype=wp.uint32)
+    triangles = wp.types.vector(length=triangles_length, dtype=getattr(wp, precision))
+    stack_type = wp.types.vector(length=stack_words, dtype=wp.uint32)
+    stack_argument = wp.ref[stack_type] if eight else wp.uint64
+
+    @wp.func_native(DISTANCES_8 if eight else DISTANCES_1)
     def plane_distances(units: wp.uint64, at: int, lane: int, rdir: float, bias: float) -> vector: ...
 
-    @wp.func_native(ROW_1)
+    @wp.func_native(ROW_8 if eight else ROW_1)
     def load_row(units: wp.uint64, at: int, lane: int) -> words: ...
 
-    @wp.func_native(_products_code(1, precision))
-    def products(a: triangles, b: triangles) -> triangles: ...
+    wide_load = TRIANGLES_4 if precision == "float32" else DOUBLE_TRIANGLES_4
 
-    @wp.func
-    def load_triangles(units: wp.uint64, at: int, lane: int):
-        return triangles(load_number(units, at + number_words * (lane & 3)))
+    @wp.func_native(wide_load if eight else TRIANGLES_1.replace("TYPE", c_type).replace("REAL", precision))
+    def load_triangles(units: wp.uint64, at: int, lane: int) -> triangles: ...
+
+    @wp.func_native(
+        PRODUCTS.replace("LENGTH", str(triangles_length))
+        .replace("REAL", precision)
+        .replace("ROUNDED", rounded)
+    )
+    def products(a: triangles, b: triangles) -> triangles: ...
 
     @wp.func_native(shared_stack_code(stack_words))
     def shared_stack() -> wp.uint64: ...
 
-    @wp.func_native("((unsigned*)stack)[at] = word;")
-    def store_word(stack: wp.uint64, at: int, word: wp.uint32): ...
+    @wp.func_native("stack[at] = word;" if eight else "((unsigned*)stack)[at] = word;")
+    def store_word(stack: stack_argument, at: int, word: wp.uint32): ...
 
-    @wp.func_native("return ((const unsigned*)stack)[at];")
-    def load_word(stack: wp.uint64, at: int) -> wp.uint32: ...
+    @wp.func_native("return stack[at];" if eight else "return ((const unsigned*)stack)[at];")
+    def load_word(stack: stack_argument, at: int) -> wp.uint32: ...
 
     return SimpleNamespace(
-        length=1,
-        block_step=2,
-        new_stack=shared_stack,
+        length=length,
+        block_step=1 if eight else 2,  # blocks of a leaf that a ray's threads test at once
         vector=vector,
         words=words,
         triangles=triangles,
-        triangles_length=1,
+        triangles_length=triangles_length,
         plane_distances=plane_distances,
         load_row=load_row,
         load_triangles=load_triangles,
         products=products,
-        or_reduce=_or_of_group,
-        min_reduce=_min_of_group,
-        sync=_sync_group,
-        stack_argument=wp.uint64,
+        new_stack=stack_type if eight else shared_stack,
+        stack_argument=stack_argument,
         store_word=without_gradient(store_word),
         load_word=without_gradient(load_word),
+        **vars(collectives(length)),
     )

@@ -1,9 +1,15 @@
-"""The native code of what lanes do: intrinsics on CUDA, plain C++ on Warp's CPU device."""
+"""Native code of the lane vectors and collectives: intrinsics on CUDA, plain C++ on Warp's CPU device.
+
+Names that end in 8 or 4 are for lanes=8, one thread per ray; those in 1 for lanes=1, eight threads per ray.
+"""
+
+from wive.warp_kernels.tree.layout import COMPRESSED_PLANES, COMPRESSED_RANKS, COMPRESSED_STEP, NUMBER_BITS
 
 # Eight threads are one group, aligned within their warp.
 _GROUP_MASK = "const unsigned group = 0xffu << (threadIdx.x & 24u);"
 
-# Every fiber of the group writes its value, waits, reads all eight, and waits before anyone writes again.
+# Every fiber of the group writes its value, reads all eight after a barrier, and passes a second barrier
+# before the next write.
 _EXCHANGE = """
     static unsigned values[WP_TILE_BLOCK_DIM];
     const int thread = WP_TILE_THREAD_IDX;
@@ -17,7 +23,7 @@ _EXCHANGE = """
 
 
 def _reduce(cuda: str, combine: str) -> str:
-    """Native code that reduces the unsigned x of a group; CUDA has it as one instruction since sm_80."""
+    """Native code that reduces the unsigned x of a group: one CUDA instruction from sm_80 on."""
     return f"""
 #if defined(__CUDA_ARCH__)
     {_GROUP_MASK}
@@ -50,8 +56,8 @@ SYNC = f"""
 #endif
 """
 
-# A row of the node against the ray: plane * rdir + bias. CUDA fuses the two; a row is two loads of 16 bytes
-# there.
+# Distances from the ray's origin to a row of planes: plane * rdir + bias, fused on CUDA, where a row is two
+# loads of 16 bytes.
 DISTANCES_8 = """
     const float* row = (const float*)units + at;
     wp::vec_t<8, wp::float32> distances;
@@ -75,7 +81,7 @@ DISTANCES_1 = """
 #endif
 """
 
-# The same row as it is, for children and ranks.
+# A row of words, for children and ranks.
 ROW_8 = """
     const float* row = (const float*)units + at;
     wp::vec_t<8, wp::uint32> words;
@@ -97,41 +103,54 @@ ROW_1 = """
 #endif
 """
 
-# The same distances where planes are bytes on a grid: byte * (step * rdir) + (origin * rdir + bias). A node
-# begins with origin and step; its rows of eight bytes follow them.
-BYTE_DISTANCES_8 = """
+_COMPRESSED_NODE = f"""
+    enum {{ STEP = {COMPRESSED_STEP}, PLANES = {COMPRESSED_PLANES}, RANKS = {COMPRESSED_RANKS} }};
+"""
+
+# Distances to a compressed row, whose planes are bytes on a grid:
+# byte * (step * rdir) + (origin * rdir + bias).
+BYTE_DISTANCES_8 = (
+    _COMPRESSED_NODE
+    + """
     const float* words = (const float*)units + node;
     wp::vec_t<8, wp::float32> distances;
 #if defined(__CUDA_ARCH__)
-    const float step = __fmul_rn(__ldg(words + 3 + axis), rdir);
+    const float step = __fmul_rn(__ldg(words + STEP + axis), rdir);
     const float base = __fmaf_rn(__ldg(words + axis), rdir, bias);
-    const uint2 bytes = __ldg((const uint2*)(words + 6) + row);
+    const uint2 bytes = __ldg((const uint2*)(words + PLANES) + row);
     for (int i = 0; i < 4; ++i) {
         distances[i] = __fmaf_rn((float)(bytes.x >> 8 * i & 255u), step, base);
         distances[4 + i] = __fmaf_rn((float)(bytes.y >> 8 * i & 255u), step, base);
     }
 #else
-    const float step = words[3 + axis] * rdir, base = words[axis] * rdir + bias;
-    const unsigned char* bytes = (const unsigned char*)(words + 6) + 8 * row;
+    const float step = words[STEP + axis] * rdir, base = words[axis] * rdir + bias;
+    const unsigned char* bytes = (const unsigned char*)(words + PLANES) + 8 * row;
     for (int i = 0; i < 8; ++i) distances[i] = (float)bytes[i] * step + base;
 #endif
     return distances;
 """
-BYTE_DISTANCES_1 = """
+)
+BYTE_DISTANCES_1 = (
+    _COMPRESSED_NODE
+    + """
     const float* words = (const float*)units + node;
-    const unsigned char* byte = (const unsigned char*)(words + 6) + 8 * row + lane;
+    const unsigned char* byte = (const unsigned char*)(words + PLANES) + 8 * row + lane;
 #if defined(__CUDA_ARCH__)
     const float base = __fmaf_rn(__ldg(words + axis), rdir, bias);
-    const float step = __fmul_rn(__ldg(words + 3 + axis), rdir);
+    const float step = __fmul_rn(__ldg(words + STEP + axis), rdir);
     return wp::vec_t<1, wp::float32>(__fmaf_rn((float)__ldg(byte), step, base));
 #else
-    return wp::vec_t<1, wp::float32>((float)*byte * (words[3 + axis] * rdir) + (words[axis] * rdir + bias));
+    return wp::vec_t<1, wp::float32>(
+        (float)*byte * (words[STEP + axis] * rdir) + (words[axis] * rdir + bias));
 #endif
 """
+)
 
-# Lanes of three bytes, the fourth being whatever comes behind.
-RANKS_8 = """
-    const unsigned* row = (const unsigned*)units + node + 18;
+# The ranks of a compressed node, three bytes per lane; the fourth byte of each word returned is undefined.
+RANKS_8 = (
+    _COMPRESSED_NODE
+    + """
+    const unsigned* row = (const unsigned*)units + node + RANKS;
     wp::vec_t<8, wp::uint32> ranks;
     for (int half = 0; half < 2; ++half) {
 #if defined(__CUDA_ARCH__)
@@ -147,38 +166,50 @@ RANKS_8 = """
     }
     return ranks;
 """
-RANKS_1 = """
-    const unsigned char* bytes = (const unsigned char*)((const unsigned*)units + node + 18) + 3 * lane;
+)
+RANKS_1 = (
+    _COMPRESSED_NODE
+    + """
+    const unsigned char* bytes = (const unsigned char*)((const unsigned*)units + node + RANKS) + 3 * lane;
 #if defined(__CUDA_ARCH__)
     return wp::vec_t<1, wp::uint32>(__ldg(bytes) | __ldg(bytes + 1) << 8 | __ldg(bytes + 2) << 16);
 #else
     return wp::vec_t<1, wp::uint32>(bytes[0] | bytes[1] << 8 | bytes[2] << 16);
 #endif
 """
+)
 
-# Of a row of shared vertices, those of four triangles, numbered by four bits each, or that of the lane's own.
-PICK_4 = """
+# One coordinate of four triangles' corners, or of the lane's own triangle, from a row of shared vertices;
+# `numbers` holds their places in the row.
+_NUMBERS = f"    enum {{ BITS = {NUMBER_BITS} }};"
+PICK_4 = (
+    _NUMBERS
+    + """
     const float* from = (const float*)units + row;
     wp::vec_t<4, wp::float32> picked;
     for (int i = 0; i < 4; ++i) {
 #if defined(__CUDA_ARCH__)
-        picked[i] = __ldg(from + (numbers >> 4 * i & 7u));
+        picked[i] = __ldg(from + (numbers >> BITS * i & 7u));
 #else
-        picked[i] = from[numbers >> 4 * i & 7u];
+        picked[i] = from[numbers >> BITS * i & 7u];
 #endif
     }
     return picked;
 """
-PICK_1 = """
-    const float* from = (const float*)units + row + (numbers >> 4 * (lane & 3) & 7u);
+)
+PICK_1 = (
+    _NUMBERS
+    + """
+    const float* from = (const float*)units + row + (numbers >> BITS * (lane & 3) & 7u);
 #if defined(__CUDA_ARCH__)
     return wp::vec_t<1, wp::float32>(__ldg(from));
 #else
     return wp::vec_t<1, wp::float32>(*from);
 #endif
 """
+)
 
-# Four triangles' worth of a row of a block, or the lane's own.
+# A row of a block: the numbers of its four triangles, or that of the lane's own triangle.
 TRIANGLES_4 = """
     const float* row = (const float*)units + at;
 #if defined(__CUDA_ARCH__)
@@ -186,6 +217,14 @@ TRIANGLES_4 = """
     return wp::vec_t<4, wp::float32>(a.x, a.y, a.z, a.w);
 #else
     return wp::vec_t<4, wp::float32>(row[0], row[1], row[2], row[3]);
+#endif
+"""
+TRIANGLES_1 = """
+    const TYPE* number = (const TYPE*)((const float*)units + at) + (lane & 3);
+#if defined(__CUDA_ARCH__)
+    return wp::vec_t<1, wp::REAL>(__ldg(number));
+#else
+    return wp::vec_t<1, wp::REAL>(*number);
 #endif
 """
 
@@ -199,8 +238,8 @@ DOUBLE_TRIANGLES_4 = """
 #endif
 """
 
-# Products that no compiler may fuse with an addition, whatever the options of the module they end up in:
-# fused, the two triangles at an edge would not compute the same numbers.
+# Products that no compiler may fuse with an addition, whatever options the module is compiled with: fused,
+# the two triangles at an edge would not compute the same numbers.
 PRODUCT = """
 #if defined(__CUDA_ARCH__)
     return ROUNDED(a, b);
@@ -231,16 +270,16 @@ EXACT_WEIGHT = """
     return ((a - b) + low) + lowest;
 """
 
-# A hit goes to the last free place of its ray's, and the number of those falls. It does not fall below zero:
-# memory stays whole even where rays were overwritten since their hits were counted. On the CPU device a ray's
-# fibers take turns.
+# Writes a hit to the last free one of the ray's places and counts `remaining` down. The count never falls
+# below zero: memory stays intact even if the rays were overwritten since their hits were counted. On the CPU
+# device the fibers of a ray run one at a time, so no atomics are needed.
 LIST_HIT = """
 #if defined(__CUDA_ARCH__)
-    const int place = atomicSub((int*)left, 1) - 1;
-    if (place < 0) { atomicAdd((int*)left, 1); return; }
+    const int place = atomicSub((int*)remaining, 1) - 1;
+    if (place < 0) { atomicAdd((int*)remaining, 1); return; }
 #else
-    if (*(const int*)left <= 0) return;
-    const int place = --*(int*)left;
+    if (*(const int*)remaining <= 0) return;
+    const int place = --*(int*)remaining;
 #endif
     REAL* hit = (REAL*)hits + 4 * (wp::int64)place;
     hit[0] = t;
@@ -251,7 +290,7 @@ LIST_HIT = """
 
 
 def shared_stack_code(words: int) -> str:
-    """Native code for a group's piece of the stack that the groups of a block share, `words` of 32 bits."""
+    """Native code for the address of a group's stack of `words`, in memory that its block shares."""
     return f"""
 #if defined(__CUDA_ARCH__)
     __shared__ unsigned stack[(WP_TILE_BLOCK_DIM + 7) / 8][{words}];

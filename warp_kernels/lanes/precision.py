@@ -1,12 +1,10 @@
-"""The two kinds of numbers that a mesh's vertices and its rays may hold: float32 and float64.
+"""The two precisions of a mesh's vertices, its rays, and t, u, v: float32 and float64.
 
-Boxes are float32 in both (docs/accuracy.md): the ray, the triangle tests and t, u, v follow the numbers.
+Boxes are float32 in both (docs/accuracy.md).
 """
 
 from types import SimpleNamespace
 
-# mypy: ignore-errors
-# Warp compiles these functions: to mypy they are no Python.
 import warp as wp
 
 from wive.warp_kernels.lanes.lanes import (
@@ -17,7 +15,7 @@ from wive.warp_kernels.lanes.lanes import (
     without_gradient,
 )
 
-# words: of 32 bits in a number. product: of two numbers, never fused with an addition.
+# words: 32-bit words per number. product: of two numbers, never fused with an addition.
 PRECISIONS = {
     "float32": SimpleNamespace(
         name="float32",
@@ -41,12 +39,12 @@ PRECISIONS = {
 
 
 def precision_of(array: wp.array) -> str:
-    """That of an array of numbers or vectors."""
+    """The precision of an array of numbers or vectors."""
     return "float64" if array.dtype in (wp.float64, wp.vec2d, wp.vec3d) else "float32"
 
 
-def kept_numbers(lanes: SimpleNamespace, precision: str, kept: int) -> SimpleNamespace:
-    """`store` and `load` of the i-th number from word `kept` of the stack on, and of three at once."""
+def stack_numbers(lanes: SimpleNamespace, precision: str, base: int) -> SimpleNamespace:
+    """Numbers kept in the stack from word `base` on: store or load the i-th, or load three at once."""
     store_word, load_word, stack_argument = lanes.store_word, lanes.load_word, lanes.stack_argument
     vec3 = PRECISIONS[precision].vec3
 
@@ -55,12 +53,12 @@ def kept_numbers(lanes: SimpleNamespace, precision: str, kept: int) -> SimpleNam
         @without_gradient
         @wp.func
         def store(stack: stack_argument, i: int, x: float):
-            store_word(stack, kept + i, wp.cast(x, wp.uint32))
+            store_word(stack, base + i, wp.cast(x, wp.uint32))
 
         @without_gradient
         @wp.func
         def load(stack: stack_argument, i: int):
-            return wp.cast(load_word(stack, kept + i), wp.float32)
+            return wp.cast(load_word(stack, base + i), wp.float32)
 
     else:
 
@@ -68,14 +66,14 @@ def kept_numbers(lanes: SimpleNamespace, precision: str, kept: int) -> SimpleNam
         @wp.func
         def store(stack: stack_argument, i: int, x: wp.float64):
             bits = wp.cast(x, wp.uint64)
-            store_word(stack, kept + 2 * i, wp.uint32(bits & wp.uint64(0xFFFFFFFF)))
-            store_word(stack, kept + 2 * i + 1, wp.uint32(bits >> wp.uint64(32)))
+            store_word(stack, base + 2 * i, wp.uint32(bits & wp.uint64(0xFFFFFFFF)))
+            store_word(stack, base + 2 * i + 1, wp.uint32(bits >> wp.uint64(32)))
 
         @without_gradient
         @wp.func
         def load(stack: stack_argument, i: int):
-            high = wp.uint64(load_word(stack, kept + 2 * i + 1))
-            return wp.cast(wp.uint64(load_word(stack, kept + 2 * i)) | (high << wp.uint64(32)), wp.float64)
+            high = wp.uint64(load_word(stack, base + 2 * i + 1))
+            return wp.cast(wp.uint64(load_word(stack, base + 2 * i)) | (high << wp.uint64(32)), wp.float64)
 
     @without_gradient
     @wp.func

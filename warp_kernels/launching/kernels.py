@@ -1,135 +1,234 @@
-"""The kernels over batches of rays: one for each query, accuracy, lane form, stack size, counters or
-none, node form and precision."""
+"""The kernels over batches of rays, specialised on what is asked.
 
-# mypy: ignore-errors
-# Warp compiles these functions: to mypy they are no Python.
+There is one kernel per query, accuracy, lane form, stack size, node form and precision, with and without
+counters.
+"""
 
 import functools
+from types import SimpleNamespace
 
 import warp as wp
 
-from wive.warp_kernels.lanes.lanes import reductions
+from wive.warp_kernels.lanes.lanes import collectives
 from wive.warp_kernels.lanes.precision import PRECISIONS
-from wive.warp_kernels.queries.frame import LOAD_FRAME, box_tmax
-from wive.warp_kernels.queries.query_exact import distance_of
-from wive.warp_kernels.traversal.states import STATES
-from wive.warp_kernels.traversal.traversal import make_traversal, query_of
-from wive.warp_kernels.tree.handle import ALL_BITS, HANDLES, NO_PRIM
+from wive.warp_kernels.queries.frame import FRAMES, LOAD_FRAME, box_tmax
+from wive.warp_kernels.queries.query_exact import query_of
+from wive.warp_kernels.traversal.states import TRAVERSALS
+from wive.warp_kernels.traversal.traversal import make_traversal
+from wive.warp_kernels.tree.handle import HANDLES, HITS
+from wive.warp_kernels.tree.layout import ALL_BITS, NO_PRIM
 
 # Multiplications and additions stay apart: fused, the two triangles at an edge would not compute the same
 # numbers.
 MODULE_OPTIONS = {"fuse_fp": False, "enable_backward": False}
 
+ray_kernel = wp.kernel(
+    module="unique", enable_backward=False, grid_stride=False, module_options=MODULE_OPTIONS
+)
+
 
 @wp.func
 def value_of(values: wp.array(dtype=wp.float32), i: int):
-    """The i-th of an array of one value for all rays, or one a ray."""
+    """The i-th of one value per ray, or the one value for all rays."""
     return values[wp.where(values.shape[0] == 1, 0, i)]
 
 
 @wp.func
-def value_of(values: wp.array(dtype=wp.float64), i: int):  # noqa: D103, F811
+def value_of(values: wp.array(dtype=wp.float64), i: int):
     return values[wp.where(values.shape[0] == 1, 0, i)]
 
 
+@wp.func_native("return (wp::uint64)(remaining.data + i);")
+def address_of_count(remaining: wp.array(dtype=wp.int32), i: int) -> wp.uint64:
+    """Address of the ray's remaining-hit counter."""
+    ...
+
+
 @functools.cache
-def closest_kernel(
+def make_kernel(
+    query: str,
     accuracy: str,
     length: int,
-    stack: int,
+    stack_size: int,
     counters: bool = False,
     nodes: str = "float32",
     precision: str = "float32",
 ) -> wp.Kernel:
-    """The kernel behind `launch_closest`, of dimensions (n, 8 // length)."""
-    traverse = make_traversal("closest", accuracy, length, stack, counters, nodes, precision)
-    load_frame, numbers = LOAD_FRAME[precision], PRECISIONS[precision]
-    real, vec2, vec3 = numbers.real, numbers.vec2, numbers.vec3
-    state_type = STATES[query_of("closest", accuracy, precision).state]
-    or_reduce, min_reduce = reductions(length)
-    tree_type = HANDLES[accuracy]
+    """The kernel of a query ("closest", "any", "count" or "all"), to be launched with dim (n, 8 // length).
 
-    @wp.kernel(module="unique", enable_backward=False, grid_stride=False, module_options=MODULE_OPTIONS)
-    def closest(
+    Its arguments are the tree's handle, origins, directions, tmin, tmax and the outputs of that query.
+    """
+    numbers, asked = PRECISIONS[precision], query_of(query, accuracy, precision)
+    real, vec3 = numbers.real, numbers.vec3
+    tree_type, frame_type = HANDLES[accuracy], FRAMES[precision]
+    found_type, result_type = asked.state, TRAVERSALS[asked.state]
+    traverse = make_traversal(query, accuracy, length, stack_size, counters, nodes, precision)
+    or_reduce = collectives(length).or_reduce
+    load_frame = LOAD_FRAME[precision]
+
+    @wp.func
+    def load_ray(
         tree: tree_type,
         origins: wp.array(dtype=vec3),
         directions: wp.array(dtype=vec3),
         tmin: wp.array(dtype=real),
         tmax: wp.array(dtype=real),
-        t: wp.array(dtype=real),
+        i: int,
+    ) -> frame_type:
+        return load_frame(
+            tree.center, tree.extent, origins[i], directions[i], value_of(tmin, i), value_of(tmax, i)
+        )
+
+    @wp.func
+    def trace(tree: tree_type, ray: frame_type, lane: int, found: found_type) -> result_type:
+        """What the traversal finds; nothing if the ray is refused or a tree's kernel has failed."""
+        result = result_type()
+        result.found = found
+        # One answer for the ray's threads, which may see the flag change at different times.
+        if ray.valid and or_reduce(wp.uint32(tree.error[0])) == wp.uint32(0):
+            result = traverse(tree, ray, lane, found)
+        return result
+
+    parts = SimpleNamespace(
+        tree=tree_type,
+        vectors=wp.array(dtype=vec3),
+        numbers=wp.array(dtype=real),
+        load_ray=load_ray,
+        trace=trace,
+        begin=asked.begin,
+    )
+    if query == "closest":
+        return _closest_kernel(parts, numbers, asked.distance, length, counters)
+    if query == "all":
+        return _all_kernel(parts, HITS[precision])
+    return (_any_kernel if query == "any" else _count_kernel)(parts, length, counters)
+
+
+def _closest_kernel(
+    parts: SimpleNamespace, numbers: SimpleNamespace, distance: wp.Function, length: int, counters: bool
+) -> wp.Kernel:
+    load_ray, trace, begin = parts.load_ray, parts.trace, parts.begin
+    real, vec2 = numbers.real, numbers.vec2
+    min_reduce = collectives(length).min_reduce
+
+    @ray_kernel
+    def closest(
+        tree: parts.tree,
+        origins: parts.vectors,
+        directions: parts.vectors,
+        tmin: parts.numbers,
+        tmax: parts.numbers,
+        t: parts.numbers,
         prim: wp.array(dtype=wp.int32),
         uv: wp.array(dtype=vec2),
         stats: wp.array(dtype=wp.vec3i),
     ):
         i, lane = wp.tid()
-        ray = load_frame(
-            tree.center, tree.extent, origins[i], directions[i], value_of(tmin, i), value_of(tmax, i)
-        )
-        found = state_type()
-        found.best.prim = wp.static(NO_PRIM)
-        # One answer for the group, whose threads may see the flag change at different times.
-        if ray.valid and or_reduce(wp.uint32(tree.error[0])) == wp.uint32(0):
-            found = traverse(tree, ray, lane)
-        own = wp.uint32(found.best.prim)
-        if box_tmax(found.best.t) != found.tmax:
+        ray = load_ray(tree, origins, directions, tmin, tmax, i)
+        result = trace(tree, ray, lane, begin(ray))
+        own = wp.uint32(result.found.prim)
+        if box_tmax(result.found.t) != result.tmax:
             own = ALL_BITS
         winner = min_reduce(own)
         if winner == ALL_BITS:
             if lane == 0:
                 t[i] = real(wp.inf)
-                prim[i] = wp.static(NO_PRIM)
+                prim[i] = NO_PRIM
                 if uv:
                     uv[i] = vec2(real(wp.nan), real(wp.nan))
         elif own == winner:
-            t[i] = distance_of(found.best, ray.scale)
-            prim[i] = found.best.prim
+            t[i] = distance(result.found, ray.scale)
+            prim[i] = result.found.prim
             if uv:
-                uv[i] = vec2(found.best.u, found.best.v)
-        if wp.static(counters):  # noqa: SIM102
+                uv[i] = vec2(result.found.u, result.found.v)
+        if wp.static(counters):
             if lane == 0:
-                stats[i] = wp.vec3i(found.inner_nodes, found.leaves, found.triangles)
+                stats[i] = wp.vec3i(result.inner_nodes, result.leaves, result.triangles)
 
     return closest
 
 
-@functools.cache
-def any_kernel(
-    accuracy: str,
-    length: int,
-    stack: int,
-    counters: bool = False,
-    nodes: str = "float32",
-    precision: str = "float32",
-) -> wp.Kernel:
-    """The kernel behind `launch_any`, of dimensions (n, 8 // length)."""
-    traverse = make_traversal("any", accuracy, length, stack, counters, nodes, precision)
-    load_frame, real, vec3 = LOAD_FRAME[precision], PRECISIONS[precision].real, PRECISIONS[precision].vec3
-    state_type = STATES[query_of("any", accuracy, precision).state]
-    or_reduce, _ = reductions(length)
-    tree_type = HANDLES[accuracy]
+def _any_kernel(parts: SimpleNamespace, length: int, counters: bool) -> wp.Kernel:
+    load_ray, trace, begin = parts.load_ray, parts.trace, parts.begin
+    or_reduce = collectives(length).or_reduce
 
-    @wp.kernel(module="unique", enable_backward=False, grid_stride=False, module_options=MODULE_OPTIONS)
+    @ray_kernel
     def any_in_the_way(
-        tree: tree_type,
-        origins: wp.array(dtype=vec3),
-        directions: wp.array(dtype=vec3),
-        tmin: wp.array(dtype=real),
-        tmax: wp.array(dtype=real),
+        tree: parts.tree,
+        origins: parts.vectors,
+        directions: parts.vectors,
+        tmin: parts.numbers,
+        tmax: parts.numbers,
         occluded: wp.array(dtype=wp.bool),
         stats: wp.array(dtype=wp.vec3i),
     ):
         i, lane = wp.tid()
-        ray = load_frame(
-            tree.center, tree.extent, origins[i], directions[i], value_of(tmin, i), value_of(tmax, i)
-        )
-        found = state_type()
-        found.best.prim = wp.static(NO_PRIM)
-        if ray.valid and or_reduce(wp.uint32(tree.error[0])) == wp.uint32(0):
-            found = traverse(tree, ray, lane)
-        hit = or_reduce(wp.where(found.best.prim == wp.static(NO_PRIM), wp.uint32(0), wp.uint32(1)))
+        ray = load_ray(tree, origins, directions, tmin, tmax, i)
+        result = trace(tree, ray, lane, begin(ray))
+        hit = or_reduce(wp.where(result.found.prim == NO_PRIM, wp.uint32(0), wp.uint32(1)))
         if lane == 0:
             occluded[i] = hit != wp.uint32(0)
             if wp.static(counters):
-                stats[i] = wp.vec3i(found.inner_nodes, found.leaves, found.triangles)
+                stats[i] = wp.vec3i(result.inner_nodes, result.leaves, result.triangles)
 
     return any_in_the_way
+
+
+def _count_kernel(parts: SimpleNamespace, length: int, counters: bool) -> wp.Kernel:
+    load_ray, trace, begin = parts.load_ray, parts.trace, parts.begin
+    sum_reduce = collectives(length).sum_reduce
+
+    @ray_kernel
+    def count_along(
+        tree: parts.tree,
+        origins: parts.vectors,
+        directions: parts.vectors,
+        tmin: parts.numbers,
+        tmax: parts.numbers,
+        counts: wp.array(dtype=wp.int32),
+        stats: wp.array(dtype=wp.vec3i),
+    ):
+        i, lane = wp.tid()
+        ray = load_ray(tree, origins, directions, tmin, tmax, i)
+        result = trace(tree, ray, lane, begin(ray))
+        count = sum_reduce(wp.uint32(result.found.count))
+        if lane == 0:
+            counts[i] = wp.int32(count)
+            if wp.static(counters):
+                stats[i] = wp.vec3i(result.inner_nodes, result.leaves, result.triangles)
+
+    return count_along
+
+
+def _all_kernel(parts: SimpleNamespace, hit_type: type) -> wp.Kernel:
+    load_ray, trace, begin = parts.load_ray, parts.trace, parts.begin
+
+    @wp.func_native("return (wp::uint64)(hits.data + first);")
+    def address_of_hit(hits: wp.array(dtype=hit_type), first: wp.int64) -> wp.uint64:
+        """Address of the ray's first hit."""
+        ...
+
+    @ray_kernel
+    def list_along(
+        tree: parts.tree,
+        origins: parts.vectors,
+        directions: parts.vectors,
+        tmin: parts.numbers,
+        tmax: parts.numbers,
+        offsets: wp.array(dtype=wp.int64),
+        remaining: wp.array(dtype=wp.int32),
+        hits: wp.array(dtype=hit_type),
+    ):
+        i, lane = wp.tid()
+        first = offsets[i]
+        # A ray whose count is zero is not traced again; all its threads return here.
+        if offsets[i + 1] == first:
+            return
+        ray = load_ray(tree, origins, directions, tmin, tmax, i)
+        found = begin(ray)
+        found.scale = ray.scale
+        found.hits = address_of_hit(hits, first)
+        found.remaining = address_of_count(remaining, i)
+        trace(tree, ray, lane, found)
+
+    return list_along

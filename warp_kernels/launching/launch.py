@@ -1,4 +1,5 @@
-"""Launches over batches of rays, without allocation or synchronisation: CUDA graphs can capture them."""
+"""Launches over batches of rays, without synchronisation and, `launch_all` and `scan_counts` aside, without
+allocation: CUDA graphs can capture them."""
 
 from __future__ import annotations
 
@@ -6,19 +7,23 @@ from typing import Any, Literal
 
 import warp as wp
 
-from wive.warp_kernels.launching.kernels import any_kernel, closest_kernel
+from wive.warp_kernels.launching.kernels import make_kernel
+from wive.warp_kernels.launching.sorting import shift_counts, sort_kernel
+from wive.warp_kernels.tree.handle import HITS
 from wive.warp_kernels.tree.quiet import cpu_blocks
 from wive.warp_kernels.tree.tree import Tree
 
 Lanes = Literal[1, 8]
 
-SHARED_BYTES = (
-    47 * 1024
-)  # static shared memory of a block is 48 KiB on every device; the rest is the rays' own
+# Warp arrays hold no more.
+MOST_HITS = 2**31 - 1
+MOST_THREADS = 1024  # per block, on every CUDA device
+# Static shared memory of a block is 48 KiB on every CUDA device; 1 KiB is for what triangle tests keep.
+SHARED_BYTES = 47 * 1024
 
 
 def default_block_dim(lanes: int) -> int:
-    """Threads a block. With lanes=1 a block's stacks stand in its shared memory: 64 keep below 48 KiB."""
+    """Threads per block: with lanes=1, 64 keep the block's stacks within its 48 KiB of shared memory."""
     return 64 if lanes == 1 else 128
 
 
@@ -39,24 +44,27 @@ def launch_closest(
 ) -> None:
     """Write the closest hit of each ray within its closed interval [tmin, tmax].
 
-    Every array lies on `tree.device`; nothing is checked, allocated or synchronised here. For trees of
-    float64 vertices read vec3d, vec2d and float64 for vec3, vec2 and float32.
+    Every array is on `tree.device`; the arrays are not checked here. For trees of float64 vertices read
+    vec3d, vec2d and float64 for vec3, vec2 and float32.
 
     Args:
         tree: what `upload` returned.
         origins, directions: (n,) vec3. A direction need not have unit length; t counts in multiples of it.
         tmin, tmax: (1,) or (n,) float32.
-        t: (n,) float32, infinity where a ray misses.
-        prim: (n,) int32, the triangle's row in `faces`, -1 where a ray misses.
-        uv: (n,) vec2, NaN where a ray misses; None where nobody asks for it.
+        t: (n,) float32, infinity on a miss.
+        prim: (n,) int32, the triangle's row in `faces`, -1 on a miss.
+        uv: (n,) vec2, NaN on a miss; None if not wanted.
         stats: (n,) vec3i, inner nodes, leaves and triangles tested; None runs the kernel without counters.
-        lanes: 8, one thread a ray (throughput); 1, eight threads a ray (latency; on Warp's CPU device fibers,
-            slow, for tests).
-        block_dim: threads a block; a multiple of 8 where lanes is 1. None picks one.
+        lanes: 8, one thread per ray (throughput); 1, eight threads per ray (latency; on Warp's CPU device
+            fibers, slow, for tests).
+        block_dim: threads per block, up to 1024; with lanes=1 a multiple of 8. None picks one.
         stream: the CUDA stream to launch on; None is the device's current one.
+
+    Raises:
+        ValueError: lanes or block_dim out of range.
     """
-    kernel = closest_kernel(tree.accuracy, lanes, tree.stack, stats is not None, tree.nodes, tree.precision)
-    launch(kernel, tree, [origins, directions, tmin, tmax], [t, prim, uv, stats], lanes, block_dim, stream)
+    rays, outputs = (origins, directions, tmin, tmax), (t, prim, uv)
+    _launch("closest", tree, rays, (*outputs, stats), lanes, block_dim, stream, counters=stats is not None)
 
 
 def launch_any(
@@ -72,39 +80,118 @@ def launch_any(
     block_dim: int | None = None,
     stream: wp.Stream | None = None,
 ) -> None:
-    """Write to occluded (n,) bool whether anything lies in each ray's closed interval [tmin, tmax].
+    """Write to occluded (n,) bool whether each ray hits anything in its closed interval [tmin, tmax].
 
     The other arguments are those of `launch_closest`.
     """
-    kernel = any_kernel(tree.accuracy, lanes, tree.stack, stats is not None, tree.nodes, tree.precision)
-    launch(kernel, tree, [origins, directions, tmin, tmax], [occluded, stats], lanes, block_dim, stream)
+    rays = (origins, directions, tmin, tmax)
+    _launch("any", tree, rays, (occluded, stats), lanes, block_dim, stream, counters=stats is not None)
 
 
-def launch(
-    kernel: wp.Kernel,
+def launch_count(
     tree: Tree,
-    rays: list[wp.array[Any]],
-    outputs: list[wp.array[Any] | None],
+    origins: wp.array[Any],
+    directions: wp.array[Any],
+    tmin: wp.array[Any],
+    tmax: wp.array[Any],
+    counts: wp.array[Any],
+    *,
+    stats: wp.array[Any] | None = None,
+    lanes: Lanes = 8,
+    block_dim: int | None = None,
+    stream: wp.Stream | None = None,
+) -> None:
+    """Write to counts (n,) int32 how many triangles each ray hits in its closed interval [tmin, tmax].
+
+    The other arguments are those of `launch_closest`.
+    """
+    rays = (origins, directions, tmin, tmax)
+    _launch("count", tree, rays, (counts, stats), lanes, block_dim, stream, counters=stats is not None)
+
+
+def scan_counts(counts: wp.array[Any]) -> wp.array[Any]:
+    """Offsets (n+1,) int64: where the hits of each ray begin, and where the last ray's end.
+
+    They are allocated here, and computed on the device's current stream.
+    """
+    shifted = wp.empty(len(counts) + 1, dtype=wp.int64, device=counts.device)
+    offsets = wp.empty_like(shifted)
+    wp.launch(shift_counts, len(shifted), [counts], [shifted], device=counts.device, record_tape=False)
+    wp.utils.array_scan(shifted, offsets, inclusive=True)
+    return offsets
+
+
+def launch_all(
+    tree: Tree,
+    origins: wp.array[Any],
+    directions: wp.array[Any],
+    tmin: wp.array[Any],
+    tmax: wp.array[Any],
+    counts: wp.array[Any],
+    offsets: wp.array[Any],
+    t: wp.array[Any],
+    prim: wp.array[Any],
+    uv: wp.array[Any],
+    *,
+    lanes: Lanes = 8,
+    block_dim: int | None = None,
+    stream: wp.Stream | None = None,
+) -> None:
+    """Write the hits that `launch_count` counted, each ray's by ascending t, then prim.
+
+    Args:
+        tree, origins, directions, tmin, tmax, lanes, block_dim, stream: as for `launch_count`.
+        counts: (n,) int32 of `launch_count`; they run down to zero.
+        offsets: (n+1,) int64 of `scan_counts`.
+        t: (h,) float32, h the last of the offsets, at most 2^31 - 1.
+        prim: (h,) int32.
+        uv: (h,) vec2. In float64 trees t is float64 and uv vec2d.
+    """
+    hits = wp.empty(len(t), dtype=HITS[tree.precision], device=tree.device)
+    rays = (origins, directions, tmin, tmax)
+    _launch("all", tree, rays, (offsets, counts, hits), lanes, block_dim, stream)
+    wp.launch(
+        sort_kernel(tree.precision),
+        len(counts),
+        [offsets, counts, hits],
+        [t, prim, uv],
+        device=tree.device,
+        stream=stream,
+        record_tape=False,
+    )
+
+
+def _launch(
+    query: str,
+    tree: Tree,
+    rays: tuple[wp.array[Any], ...],
+    outputs: tuple[wp.array[Any] | None, ...],
     lanes: Lanes,
     block_dim: int | None,
     stream: wp.Stream | None,
+    *,
+    counters: bool = False,
 ) -> None:
-    """Launch a kernel over rays: origins, directions, tmin, tmax; a null output is one nobody asked for."""
-    count = len(rays[0])
-    if count == 0:
-        return
+    """Launch a query's kernel over rays: origins, directions, tmin, tmax; outputs not wanted are None."""
+    if lanes not in (1, 8):
+        raise ValueError(f"lanes: expected 8 or 1, got {lanes!r}")
     if block_dim is None:
         block_dim = default_block_dim(lanes)
+    if not 0 < block_dim <= MOST_THREADS:
+        raise ValueError(f"block_dim: expected 1 to {MOST_THREADS} threads, got {block_dim}")
     if lanes == 1 and block_dim % 8 != 0:
         raise ValueError(f"block_dim: expected a multiple of 8 with lanes=1, got {block_dim}")
     if lanes == 1 and tree.device.is_cuda and block_dim // 8 * tree.stack * 8 > SHARED_BYTES:
         raise ValueError(f"block_dim: {block_dim} threads have no room for their stacks in 48 KiB; use fewer")
+    if len(rays[0]) == 0:
+        return
+    kernel = make_kernel(query, tree.accuracy, lanes, tree.stack, counters, tree.nodes, tree.precision)
     with cpu_blocks(lanes == 1 and tree.device.is_cpu):
         wp.launch(
             kernel,
-            dim=(count, 8 // lanes),
+            dim=(len(rays[0]), 8 // lanes),
             inputs=[tree.handle, *rays],
-            outputs=outputs,
+            outputs=list(outputs),
             device=tree.device,
             stream=stream,
             block_dim=block_dim,

@@ -1,14 +1,12 @@
-"""Each ray's hits sorted by t, then prim, and handed over as separate arrays: one thread a ray."""
-
-# mypy: ignore-errors
-# Warp compiles these functions: to mypy they are no Python.
+"""Sorts each ray's hits by t, then prim, and writes them to separate arrays: one thread per ray."""
 
 import functools
 
 import warp as wp
 
 from wive.warp_kernels.lanes.precision import PRECISIONS
-from wive.warp_kernels.tree.handle import HITS, NO_PRIM
+from wive.warp_kernels.tree.handle import HITS
+from wive.warp_kernels.tree.layout import NO_PRIM
 
 # Shorter lists are sorted by insertion: fewer moves than a heap makes.
 SHORT = 16
@@ -16,18 +14,18 @@ SHORT = 16
 
 @functools.cache
 def sort_kernel(precision: str = "float32") -> wp.Kernel:
-    """The kernel that sorts hits in trees of that precision."""
+    """The kernel that sorts hits in trees of this precision, with dim n."""
     numbers, hit_type = PRECISIONS[precision], HITS[precision]
     real, vec2 = numbers.real, numbers.vec2
 
     @wp.func
     def comes_before(a: hit_type, b: hit_type):
-        """The order of a ray's hits; no two are equal, because no triangle is met twice."""
+        """The order of a ray's hits; no two are equal, because no triangle is listed twice."""
         return a.t < b.t or (a.t == b.t and a.prim < b.prim)
 
     @wp.func
     def sort_short(hits: wp.array(dtype=hit_type), begin: int, end: int):
-        """By insertion."""
+        """Insertion sort."""
         for i in range(begin + 1, end):
             moving = hits[i]
             at = int(i)
@@ -38,7 +36,7 @@ def sort_kernel(precision: str = "float32") -> wp.Kernel:
 
     @wp.func
     def sift_down(hits: wp.array(dtype=hit_type), begin: int, place: int, count: int):
-        """Move the hit at `place` of a heap of `count` down to where none below it comes later."""
+        """Move the hit at `place` in a heap of `count` down until none below it comes later."""
         at = int(place)
         moving = hits[begin + at]
         child = 2 * at + 1
@@ -68,24 +66,24 @@ def sort_kernel(precision: str = "float32") -> wp.Kernel:
     @wp.kernel(module="unique", enable_backward=False, grid_stride=False)
     def sort_hits(
         offsets: wp.array(dtype=wp.int64),
-        left: wp.array(dtype=wp.int32),
+        remaining: wp.array(dtype=wp.int32),
         hits: wp.array(dtype=hit_type),
         t: wp.array(dtype=real),
         prim: wp.array(dtype=wp.int32),
         uv: wp.array(dtype=vec2),
     ):
-        """Of dimension (n,). `left` is 0 unless a traversal was cut short: what it did not fill is a miss."""
+        """`remaining` is 0 unless a traversal was cut short: the places that it left are misses."""
         i = wp.tid()
         begin = wp.int32(offsets[i])
         end = wp.int32(offsets[i + 1])
-        for k in range(left[i]):
+        for k in range(remaining[i]):
             missing = hit_type()
             missing.t = real(wp.inf)
             missing.u = real(wp.nan)
             missing.v = real(wp.nan)
-            missing.prim = wp.static(NO_PRIM)
+            missing.prim = NO_PRIM
             hits[begin + k] = missing
-        if end - begin <= wp.static(SHORT):
+        if end - begin <= SHORT:
             sort_short(hits, begin, end)
         else:
             sort_long(hits, begin, end)
@@ -100,7 +98,7 @@ def sort_kernel(precision: str = "float32") -> wp.Kernel:
 
 @wp.kernel(module="unique", enable_backward=False, grid_stride=False)
 def shift_counts(counts: wp.array(dtype=wp.int32), shifted: wp.array(dtype=wp.int64)):
-    """Of dimension (n + 1,): the counts behind a zero, whose running sums are where each ray's hits begin."""
+    """The counts behind a zero, with dim n + 1: their running sums are where each ray's hits begin."""
     i = wp.tid()
     if i == 0:
         shifted[i] = wp.int64(0)

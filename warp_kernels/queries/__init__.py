@@ -1,1 +1,1 @@
-"""A ray as a traversal uses it, and what each query keeps of the hits it finds."""
+"""A ray made ready for traversal, and what each query keeps of the hits it finds."""

@@ -1,24 +1,24 @@
-"""A ray made ready for traversal, as in frame.h: checked, scaled, reciprocal and slab offsets taken."""
+"""A ray made ready for traversal: checked, scaled, with reciprocals and slab offsets.
 
-# mypy: ignore-errors
-# Warp compiles these functions: to mypy they are no Python.
+Operation by operation as cpu/traverse/frame.h.
+"""
 
 import warp as wp
 
 from wive.warp_kernels.lanes.precision import PRECISIONS
-from wive.warp_kernels.tree.handle import SIGN_BIT
+from wive.warp_kernels.tree.layout import SIGN_BIT
 
 MAX_COORDINATE = 1e18
 MAX_FLOAT = 3.4028234663852886e38
 MAX_DOUBLE = 1.7976931348623157e308
 SMALLEST_PART = wp.constant(wp.float32(2.0**-30))
-LEAST_REACH = wp.constant(wp.float32(2.0**-100))
+LEAST_MAGNITUDE = wp.constant(wp.float32(2.0**-100))
 SLACK_FACTOR = wp.constant(wp.float32(2.0**-20))
 
 
 @wp.struct
 class RayFrame:
-    """See cpu/traverse/frame.h for what each is and why it is enough."""
+    """A ray in the frame's units; cpu/traverse/frame.h derives its bounds."""
 
     origin: wp.vec3
     direction: wp.vec3  # scaled by a power of two: its longest component lies in [1, 2)
@@ -30,15 +30,15 @@ class RayFrame:
     scale: wp.float32  # t of the caller's ray = scale * t here
     octant: wp.int32  # bit a: negative on axis a, from the sign of the reciprocal
     longest_axis: wp.int32
-    given_direction: wp.vec3  # as the caller gave them: exact trees alone need these three
+    given_direction: wp.vec3  # this and the limits below as the caller gave them, for exact trees
     given_tmin: wp.float32
     given_tmax: wp.float32
-    valid: wp.bool  # false where the ray hits nothing by rule
+    valid: wp.bool  # false if the ray misses by rule: NaN, out of range, zero direction, empty interval
 
 
 @wp.struct
 class RayFrame64:
-    """The same in a float64 tree: the ray in double, and for boxes in float32 what is not the ray's own."""
+    """A ray in a float64 tree: the ray's own numbers in double, those for boxes in float32."""
 
     origin: wp.vec3d
     direction: wp.vec3d
@@ -56,23 +56,23 @@ class RayFrame64:
 
 @wp.func
 def is_negative(x: float):
-    """Whether the sign bit is set: true of -0.0."""
+    """Whether the sign bit is set, which is true of -0.0."""
     return wp.cast(x, wp.int32) < 0
 
 
 @wp.func
-def is_negative(x: wp.float64):  # noqa: D103, F811
+def is_negative(x: wp.float64):
     return wp.cast(x, wp.int64) < wp.int64(0)
 
 
 @wp.func
 def flip_sign(x: float, sign: float):
-    """x, negated where `sign` has its sign bit set; by the bit, because Warp's -x is 0 - x and loses -0."""
+    """x, negated if `sign` has its sign bit set; by the bit, because Warp's -x is 0 - x and loses -0."""
     return wp.cast(wp.cast(x, wp.uint32) ^ (wp.cast(sign, wp.uint32) & SIGN_BIT), wp.float32)
 
 
 @wp.func
-def flip_sign(x: wp.float64, sign: wp.float64):  # noqa: D103, F811
+def flip_sign(x: wp.float64, sign: wp.float64):
     bit = wp.cast(sign, wp.uint64) & wp.uint64(0x8000000000000000)
     return wp.cast(wp.cast(x, wp.uint64) ^ bit, wp.float64)
 
@@ -84,7 +84,7 @@ def component(v: wp.vec3, axis: int):
 
 
 @wp.func
-def component(v: wp.vec3d, axis: int):  # noqa: D103, F811
+def component(v: wp.vec3d, axis: int):
     return wp.where(axis == 0, v[0], wp.where(axis == 1, v[1], v[2]))
 
 
@@ -98,12 +98,12 @@ def next_above(x: float):
 
 @wp.func
 def box_tmax(t: float):
-    """What boxes take for the ray's t: here the same."""
+    """t rounded up to float32, for boxes."""
     return t
 
 
 @wp.func
-def box_tmax(t: wp.float64):  # noqa: D103, F811
+def box_tmax(t: wp.float64):
     rounded = wp.float32(t)
     if wp.float64(rounded) < t:
         rounded = next_above(rounded)
@@ -112,18 +112,18 @@ def box_tmax(t: wp.float64):  # noqa: D103, F811
 
 @wp.func
 def box_tmin(ray: RayFrame):
-    """The same of the ray's tmin."""
+    """The ray's tmin rounded down to float32, for boxes."""
     return ray.tmin
 
 
 @wp.func
-def box_tmin(ray: RayFrame64):  # noqa: D103, F811
+def box_tmin(ray: RayFrame64):
     return ray.box_tmin
 
 
 @wp.func
 def powers_of(longest: float):
-    """The power of two that brings the longest component to [1, 2), and one over it."""
+    """The power of two that scales the longest component to [1, 2), and its reciprocal."""
     exponent = wp.min(wp.cast(longest, wp.uint32) >> wp.uint32(23), wp.uint32(253))
     unscale_bits = wp.where(exponent > wp.uint32(0), exponent << wp.uint32(23), wp.uint32(1) << wp.uint32(22))
     return wp.vec2(
@@ -132,7 +132,7 @@ def powers_of(longest: float):
 
 
 @wp.func
-def powers_of(longest: wp.float64):  # noqa: D103, F811
+def powers_of(longest: wp.float64):
     exponent = wp.min(wp.cast(longest, wp.uint64) >> wp.uint64(52), wp.uint64(2045))
     unscale_bits = wp.where(exponent > wp.uint64(0), exponent << wp.uint64(52), wp.uint64(1) << wp.uint64(51))
     return wp.vec2d(
@@ -142,13 +142,13 @@ def powers_of(longest: wp.float64):  # noqa: D103, F811
 
 @wp.func
 def axes_of(longest: int):
-    """The axes in the order of the triangle tests' sheared space, the direction's longest last."""
+    """The axes in the order of the triangle tests' sheared space, the direction's longest axis last."""
     x = wp.where(longest == 2, 0, longest + 1)
     return wp.vec3i(x, wp.where(x == 2, 0, x + 1), longest)
 
 
 def make_load_frame(precision: str, frame_type: type) -> wp.Function:
-    """The function that makes a ray of that precision ready."""
+    """The function that makes a ray of this precision ready."""
     numbers = PRECISIONS[precision]
     real, vec3 = numbers.real, numbers.vec3
     double: bool = precision == "float64"
@@ -184,16 +184,16 @@ def make_load_frame(precision: str, frame_type: type) -> wp.Function:
             ray.given_tmin = tmin
             ray.given_tmax = tmax
 
-        reach = float(0.0)  # noqa: UP018
+        magnitude = float(0.0)
         for axis in range(3):
-            reach = wp.max(reach, extent[axis] + wp.abs(relative[axis]))
-        reach = reach + LEAST_REACH
+            magnitude = wp.max(magnitude, extent[axis] + wp.abs(relative[axis]))
+        magnitude = magnitude + LEAST_MAGNITUDE
         smallest = wp.float32(longest * ray.scale) * SMALLEST_PART
         for axis in range(3):
             size = 1.0 / wp.max(wp.abs(scaled[axis]), smallest)
             reciprocal = flip_sign(size, scaled[axis])
             distance = relative[axis] * reciprocal
-            slack = size * (reach * SLACK_FACTOR)
+            slack = size * (magnitude * SLACK_FACTOR)
             ray.rdir[axis] = reciprocal
             ray.near_bias[axis] = 0.0 - (distance + slack)
             ray.far_bias[axis] = slack - distance
@@ -207,4 +207,3 @@ def make_load_frame(precision: str, frame_type: type) -> wp.Function:
 
 FRAMES = {"float32": RayFrame, "float64": RayFrame64}
 LOAD_FRAME = {precision: make_load_frame(precision, frame) for precision, frame in FRAMES.items()}
-load_frame = LOAD_FRAME["float32"]

@@ -1,15 +1,38 @@
-"""What a query keeps of the hits it is offered, as cpu/traverse/query.h."""
+"""The queries: what each keeps of the hits it is offered, as cpu/traverse/query.h and query_all.h."""
 
-from types import SimpleNamespace
+from dataclasses import dataclass
+from typing import Any
 
-# mypy: ignore-errors
-# Warp compiles these functions: to mypy they are no Python.
 import warp as wp
 
+from wive.warp_kernels.lanes.native import LIST_HIT
 from wive.warp_kernels.lanes.precision import PRECISIONS
-from wive.warp_kernels.queries.frame import RayFrame, RayFrame64
-from wive.warp_kernels.queries.query_all import Crossings, Crossings64, begin_crossings, crossing_offers
-from wive.warp_kernels.tree.handle import NO_PRIM
+from wive.warp_kernels.queries.frame import FRAMES
+from wive.warp_kernels.tree.handle import derive_struct
+from wive.warp_kernels.tree.layout import NO_PRIM
+
+
+@dataclass(frozen=True)
+class Query:
+    """A query in trees of one precision.
+
+    state: struct of what one thread has found.
+    begin: the state of a ray for which nothing has been found.
+    offer: the state after a hit, taken if it lies within the limits.
+    distance: t in the caller's units, for the closest hit.
+    in_order: children are visited from front to back and stored with their distances, because tmax falls with
+        every hit.
+    first_hit_ends: a hit of any thread ends the query.
+    perturb_edges: hits are counted, so a ray through an edge or vertex must hit one of the triangles there.
+    """
+
+    state: Any
+    begin: wp.Function
+    offer: wp.Function
+    distance: wp.Function | None = None
+    in_order: bool = False
+    first_hit_ends: bool = False
+    perturb_edges: bool = False
 
 
 @wp.struct
@@ -23,55 +46,58 @@ class Best:
 
 
 @wp.struct
-class Best64:
-    """The same in a float64 tree."""
+class MultiHit:
+    """The number of triangles that one thread has hit, and the list that hits are added to."""
 
-    t: wp.float64
-    u: wp.float64
-    v: wp.float64
-    prim: wp.int32
-
-
-@wp.func
-def begin_best(ray: RayFrame):
-    """Nothing hit yet."""
-    best = Best()
-    best.t = ray.tmax
-    best.prim = wp.static(NO_PRIM)
-    return best
+    tmax: wp.float32  # in the frame's units
+    count: wp.int32
+    scale: wp.float32  # t of the caller's ray = scale * t here
+    hits: wp.uint64  # address of the ray's first `Hit`
+    remaining: wp.uint64  # address of the number of hits still to be listed
 
 
-@wp.func
-def begin_best(ray: RayFrame64):  # noqa: D103, F811
-    best = Best64()
-    best.t = ray.tmax
-    best.prim = wp.static(NO_PRIM)
-    return best
+Best64 = derive_struct(Best, "Best64", "`Best` in a float64 tree.", t=wp.float64, u=wp.float64, v=wp.float64)
+MultiHit64 = derive_struct(
+    MultiHit, "MultiHit64", "`MultiHit` in a float64 tree.", tmax=wp.float64, scale=wp.float64
+)
 
 
-@wp.func
-def distance_of(best: Best, scale: float):
-    """t in the caller's units."""
-    return best.t * scale
+@wp.func_native(LIST_HIT.replace("REAL", "float"))
+def list_hit(hits: wp.uint64, remaining: wp.uint64, t: float, u: float, v: float, prim: int):
+    """Write a hit to the last place still free; all threads of the ray may."""
+    ...
 
 
-@wp.func
-def distance_of(best: Best64, scale: wp.float64):  # noqa: D103, F811
-    return best.t * scale
+@wp.func_native(LIST_HIT.replace("REAL", "double"))
+def list_hit(
+    hits: wp.uint64, remaining: wp.uint64, t: wp.float64, u: wp.float64, v: wp.float64, prim: int
+): ...
 
 
-def make_queries(precision: str, best_type: type, crossings_type: type) -> dict[str, SimpleNamespace]:
-    """The queries by name, for trees of that precision.
+def make_queries(precision: str, best_type: Any, multi_hit_type: Any) -> dict[str, Query]:
+    """The queries by name, for trees of this precision."""
+    real, vec3, frame_type = PRECISIONS[precision].real, PRECISIONS[precision].vec3, FRAMES[precision]
 
-    in_order: children are met from front to back and kept with their distances, because tmax falls with every
-    hit. one_is_enough: a hit of any thread ends the query. crossings: how many hits there are matters.
-    """
-    real, vec3 = PRECISIONS[precision].real, PRECISIONS[precision].vec3
-    offer_count, offer_all, never_done = crossing_offers(crossings_type, real, vec3)
+    @wp.func
+    def begin_best(ray: frame_type):
+        best = best_type()
+        best.t = ray.tmax
+        best.prim = NO_PRIM
+        return best
+
+    @wp.func
+    def begin_multi_hit(ray: frame_type):
+        found = multi_hit_type()
+        found.tmax = ray.tmax
+        return found
+
+    @wp.func
+    def distance(best: best_type, scale: real):
+        return best.t * scale
 
     @wp.func
     def offer_closest(best: best_type, tmin: real, hit: vec3, prim: int):
-        """The nearest hit in [tmin, t]; of hits at one t the lowest prim, in whatever order they come."""
+        """The nearest hit in [tmin, t]; of hits at the same t the lowest prim, in any order of offers."""
         t = hit[0]
         if t >= tmin and (t < best.t or (t == best.t and wp.uint32(prim) < wp.uint32(best.prim))):
             best.t = t
@@ -88,56 +114,28 @@ def make_queries(precision: str, best_type: type, crossings_type: type) -> dict[
         return best
 
     @wp.func
-    def closest_done(best: best_type):
-        """Whether one thread's hits end the query."""
-        return False
+    def offer_count(found: multi_hit_type, tmin: real, hit: vec3, prim: int):
+        """Count the hits in [tmin, tmax]."""
+        if hit[0] >= tmin and hit[0] <= found.tmax:
+            found.count += 1
+        return found
 
     @wp.func
-    def any_done(best: best_type):
-        """Whether one thread's hits end the query."""
-        return best.prim != wp.static(NO_PRIM)
+    def offer_all(found: multi_hit_type, tmin: real, hit: vec3, prim: int):
+        """List the hits in [tmin, tmax]."""
+        if hit[0] >= tmin and hit[0] <= found.tmax:
+            list_hit(found.hits, found.remaining, hit[0] * found.scale, hit[1], hit[2], prim)
+        return found
 
     return {
-        "closest": SimpleNamespace(
-            in_order=True,
-            one_is_enough=False,
-            crossings=False,
-            state=best_type,
-            begin=begin_best,
-            offer=offer_closest,
-            done=closest_done,
-        ),
-        "any": SimpleNamespace(
-            in_order=False,
-            one_is_enough=True,
-            crossings=False,
-            state=best_type,
-            begin=begin_best,
-            offer=offer_any,
-            done=any_done,
-        ),
-        "count": SimpleNamespace(
-            in_order=False,
-            one_is_enough=False,
-            crossings=True,
-            state=crossings_type,
-            begin=begin_crossings,
-            offer=offer_count,
-            done=never_done,
-        ),
-        "all": SimpleNamespace(
-            in_order=False,
-            one_is_enough=False,
-            crossings=True,
-            state=crossings_type,
-            begin=begin_crossings,
-            offer=offer_all,
-            done=never_done,
-        ),
+        "closest": Query(best_type, begin_best, offer_closest, distance, in_order=True),
+        "any": Query(best_type, begin_best, offer_any, first_hit_ends=True),
+        "count": Query(multi_hit_type, begin_multi_hit, offer_count, perturb_edges=True),
+        "all": Query(multi_hit_type, begin_multi_hit, offer_all, perturb_edges=True),
     }
 
 
 QUERIES = {
-    "float32": make_queries("float32", Best, Crossings),
-    "float64": make_queries("float64", Best64, Crossings64),
+    "float32": make_queries("float32", Best, MultiHit),
+    "float64": make_queries("float64", Best64, MultiHit64),
 }

@@ -1,15 +1,12 @@
-"""What queries of an exact tree keep, as query_exact.h: hits are offered once they are known to count."""
+"""The queries of exact trees: hits are offered once they are known to lie within the limits."""
 
-from types import SimpleNamespace
+from dataclasses import replace
 
-# mypy: ignore-errors
-# Warp compiles these functions: to mypy they are no Python.
 import warp as wp
 
 from wive.warp_kernels.queries.frame import RayFrame
-from wive.warp_kernels.queries.query import QUERIES, Best, distance_of
-from wive.warp_kernels.queries.query_all import Crossings, list_hit
-from wive.warp_kernels.tree.handle import NO_PRIM
+from wive.warp_kernels.queries.query import QUERIES, Best, MultiHit, Query, list_hit
+from wive.warp_kernels.tree.layout import NO_PRIM
 
 
 @wp.struct
@@ -21,7 +18,7 @@ class ExactBest:
     u: wp.float32
     v: wp.float32
     prim: wp.int32
-    place: wp.int32  # where in the tree its triangle is, to compare it again
+    place: wp.int32  # of its triangle in the tree, so that equal t can be compared exactly
 
 
 @wp.func
@@ -30,51 +27,49 @@ def begin_exact(ray: RayFrame):
     best = ExactBest()
     best.t = ray.tmax
     best.given_t = wp.inf
-    best.prim = wp.static(NO_PRIM)
+    best.prim = NO_PRIM
     return best
 
 
 @wp.func
-def distance_of(best: ExactBest, scale: float):  # noqa: F811
+def exact_distance(best: ExactBest, scale: float):
     """t in the caller's units."""
     return best.given_t
 
 
 @wp.func
-def exact_done(best: ExactBest):
-    """Whether one thread's hits end the query."""
-    return False
-
-
-@wp.func
-def take_any(best: Best, hit: wp.vec4, prim: int):
+def offer_any(best: Best, hit: wp.vec4, prim: int):
     """Any hit."""
     best.prim = prim
     return best
 
 
 @wp.func
-def take_count(found: Crossings, hit: wp.vec4, prim: int):
+def offer_count(found: MultiHit, hit: wp.vec4, prim: int):
     """Count every hit."""
     found.count += 1
     return found
 
 
 @wp.func
-def take_all(found: Crossings, hit: wp.vec4, prim: int):
+def offer_all(found: MultiHit, hit: wp.vec4, prim: int):
     """List every hit."""
-    list_hit(found.hits, found.left, hit[0], hit[1], hit[2], prim)
+    list_hit(found.hits, found.remaining, hit[0], hit[1], hit[2], prim)
     return found
 
 
-# As QUERIES; `take` keeps a hit that lies within the limits, and is None where it has to compare.
 _FLOAT32 = QUERIES["float32"]
+# The closest hit has no `offer` here: triangle_exact.py compares distances, for which it needs the tree.
 EXACT_QUERIES = {
-    "closest": SimpleNamespace(
-        **{**vars(_FLOAT32["closest"]), "state": ExactBest, "begin": begin_exact, "done": exact_done},
-        take=None,
+    "closest": replace(
+        _FLOAT32["closest"], state=ExactBest, begin=begin_exact, offer=None, distance=exact_distance
     ),
-    "any": SimpleNamespace(**vars(_FLOAT32["any"]), take=take_any),
-    "count": SimpleNamespace(**vars(_FLOAT32["count"]), take=take_count),
-    "all": SimpleNamespace(**vars(_FLOAT32["all"]), take=take_all),
+    "any": replace(_FLOAT32["any"], offer=offer_any),
+    "count": replace(_FLOAT32["count"], offer=offer_count),
+    "all": replace(_FLOAT32["all"], offer=offer_all),
 }
+
+
+def query_of(query: str, accuracy: str, precision: str = "float32") -> Query:
+    """The query of that name in trees of this accuracy and precision."""
+    return (EXACT_QUERIES if accuracy == "exact" else QUERIES[precision])[query]

@@ -1,1 +1,1 @@
-"""The traversal loop and its slab test."""
+"""The traversal loop, its visit of a node and its test of a leaf."""

@@ -1,64 +1,20 @@
-"""What a traversal and the test of a leaf return, by what the query keeps of hits."""
+"""The structs that a traversal and the test of a leaf return, for each type of what a query has found."""
 
-# mypy: ignore-errors
-# Warp compiles these functions: to mypy they are no Python.
+from typing import Any
+
 import warp as wp
 
-from wive.warp_kernels.queries.query import Best, Best64
-from wive.warp_kernels.queries.query_all import Crossings, Crossings64
+from wive.warp_kernels.queries.query import Best, Best64, MultiHit, MultiHit64
 from wive.warp_kernels.queries.query_exact import ExactBest
+from wive.warp_kernels.tree.handle import derive_struct
 
 
 @wp.struct
 class Traversal:
-    """What a thread knows at the end: its own best hit, how the group stands, and the steps taken."""
+    """The result of one thread's traversal: its own hits, and the steps that the ray's threads took."""
 
-    best: Best
-    tmax: wp.float32  # the group's
-    inner_nodes: wp.int32
-    leaves: wp.int32
-    triangles: wp.int32
-
-
-@wp.struct
-class Crossed:
-    """The same of a query for everything along the ray."""
-
-    best: Crossings
-    tmax: wp.float32
-    inner_nodes: wp.int32
-    leaves: wp.int32
-    triangles: wp.int32
-
-
-@wp.struct
-class ExactTraversal:
-    """The same of the closest hit in an exact tree."""
-
-    best: ExactBest
-    tmax: wp.float32
-    inner_nodes: wp.int32
-    leaves: wp.int32
-    triangles: wp.int32
-
-
-@wp.struct
-class Traversal64:
-    """The same of a hit in a float64 tree; tmax is for boxes."""
-
-    best: Best64
-    tmax: wp.float32
-    inner_nodes: wp.int32
-    leaves: wp.int32
-    triangles: wp.int32
-
-
-@wp.struct
-class Crossed64:
-    """The same of a query for everything along the ray in a float64 tree."""
-
-    best: Crossings64
-    tmax: wp.float32
+    found: Best
+    tmax: wp.float32  # for boxes, the same in all threads of the ray
     inner_nodes: wp.int32
     leaves: wp.int32
     triangles: wp.int32
@@ -66,55 +22,16 @@ class Crossed64:
 
 @wp.struct
 class TestedLeaf:
-    """A thread's best hit after a leaf, and the block after which it stopped."""
+    """What one thread has found after a leaf, and the last block that it tested."""
 
-    best: Best
+    found: Best
     last: wp.int32
 
 
-@wp.struct
-class CrossedLeaf:
-    """The same of a query for everything along the ray."""
-
-    best: Crossings
-    last: wp.int32
-
-
-@wp.struct
-class ExactLeaf:
-    """The same of the closest hit in an exact tree."""
-
-    best: ExactBest
-    last: wp.int32
-
-
-@wp.struct
-class TestedLeaf64:
-    """The same of a hit in a float64 tree."""
-
-    best: Best64
-    last: wp.int32
-
-
-@wp.struct
-class CrossedLeaf64:
-    """The same of a query for everything along the ray in a float64 tree."""
-
-    best: Crossings64
-    last: wp.int32
-
-
-STATES = {
-    Best: Traversal,
-    Crossings: Crossed,
-    ExactBest: ExactTraversal,
-    Best64: Traversal64,
-    Crossings64: Crossed64,
-}
-LEAVES = {
-    Best: TestedLeaf,
-    Crossings: CrossedLeaf,
-    ExactBest: ExactLeaf,
-    Best64: TestedLeaf64,
-    Crossings64: CrossedLeaf64,
-}
+TRAVERSALS: dict[Any, Any] = {Best: Traversal}
+LEAVES: dict[Any, Any] = {Best: TestedLeaf}
+for _state in (MultiHit, ExactBest, Best64, MultiHit64):
+    for _structs in (TRAVERSALS, LEAVES):
+        _base = _structs[Best]
+        _doc = f"`{_base.key}` of a query that keeps `{_state.key}`."
+        _structs[_state] = derive_struct(_base, _base.key + _state.key, _doc, found=_state)

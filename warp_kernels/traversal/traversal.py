@@ -1,38 +1,25 @@
-"""WiVe: single-ray traversal of the 8-wide tree, as cpu/traverse/traversal.h.
+"""The WiVe traversal of the 8-wide tree, one ray at a time, as cpu/traverse/traversal.h.
 
 Fuetterling, Lojewski, Pfreundt, Hamann, Ebert: "Accelerated Single Ray Tracing for Wide Vector Units", HPG
-2017.
+2017. The paper's four steps (A) order, (B) slabs, (C) compress, (D) store are in slabs.py.
 """
 
-# mypy: ignore-errors
-# Warp compiles these functions: to mypy they are no Python.
-
 import functools
-from types import SimpleNamespace
+from typing import Any
 
 import warp as wp
 
-from wive.warp_kernels.lanes.lanes import address_of, lanes_of, load_float, lowest_lane, without_gradient
+from wive.warp_kernels.lanes.lanes import address_of, lanes_of, without_gradient
 from wive.warp_kernels.lanes.precision import PRECISIONS
 from wive.warp_kernels.queries.frame import FRAMES, box_tmax
-from wive.warp_kernels.queries.query import QUERIES
-from wive.warp_kernels.queries.query_exact import EXACT_QUERIES
-from wive.warp_kernels.traversal.settling import settle_doubles, sortable, unsortable
+from wive.warp_kernels.queries.query_exact import query_of
+from wive.warp_kernels.traversal.leaf import make_count, make_leaf_test, make_offer
+from wive.warp_kernels.traversal.nearest import keep_nearest_double, sortable, unsortable
 from wive.warp_kernels.traversal.slabs import make_visit
-from wive.warp_kernels.traversal.states import LEAVES, STATES
+from wive.warp_kernels.traversal.states import TRAVERSALS
 from wive.warp_kernels.tree.blocks import block_form
-from wive.warp_kernels.tree.handle import (
-    ALL_BITS,
-    BLOCK_WIDTH,
-    COMPRESSED_NODE_WORDS,
-    CORRUPT,
-    END_OF_STACK,
-    HANDLES,
-    NO_PRIM,
-    NODE_WIDTH,
-    NODE_WORDS,
-    WORD_MASK,
-)
+from wive.warp_kernels.tree.handle import CORRUPT, HANDLES
+from wive.warp_kernels.tree.layout import ALL_BITS, END_OF_STACK, NO_PRIM, NODE_WIDTH, WORD_MASK
 from wive.warp_kernels.tree.nodes import NODES
 from wive.warp_kernels.triangles import (
     triangle_exact,
@@ -40,17 +27,18 @@ from wive.warp_kernels.triangles import (
     triangle_watertight,
     triangle_watertight_float64,
 )
-from wive.warp_kernels.triangles.triangle_exact import make_exact_leaf_test
+from wive.warp_kernels.triangles.triangle_exact import make_exact_offer
 
+# The triangle test of each accuracy and precision, and the words that it keeps of a ray.
 TRIANGLES = {
-    ("fast", "float32"): (triangle_fast.fast_triangles, triangle_fast.KEPT_WORDS),
-    ("fast", "float64"): (triangle_fast.double_triangles, 2 * triangle_fast.KEPT_WORDS),
-    ("watertight", "float32"): (triangle_watertight.watertight_triangles, triangle_watertight.KEPT_WORDS),
+    ("fast", "float32"): (triangle_fast.fast_triangles, triangle_fast.RAY_NUMBERS),
+    ("fast", "float64"): (triangle_fast.fast_triangles, 2 * triangle_fast.RAY_NUMBERS),
+    ("watertight", "float32"): (triangle_watertight.watertight_triangles, triangle_watertight.RAY_WORDS),
     ("watertight", "float64"): (
         triangle_watertight_float64.watertight_doubles,
-        triangle_watertight_float64.KEPT_WORDS,
+        triangle_watertight_float64.RAY_WORDS,
     ),
-    ("exact", "float32"): (triangle_exact.exact_triangles, triangle_exact.KEPT_WORDS),
+    ("exact", "float32"): (triangle_exact.exact_triangles, triangle_exact.RAY_WORDS),
 }
 
 
@@ -59,60 +47,39 @@ def make_traversal(
     query: str,
     accuracy: str,
     length: int,
-    entries: int,
+    stack_size: int,
     counters: bool,
     nodes: str = "float32",
     precision: str = "float32",
 ) -> wp.Function:
-    """The traversal for one query, accuracy, lane form, node form and precision.
+    """The traversal for a query, accuracy, lane form, stack size, node form and precision.
 
-    That many stack entries must do for the tree.
+    traverse(tree, ray, lane, found) continues from the state `found` and returns one of TRAVERSALS. Its stack
+    holds `stack_size` children, behind them their distances if the query is in order, and behind these what
+    the triangle test keeps of the ray.
     """
-    traverse_from = make_traversal_from(query, accuracy, length, entries, counters, nodes, precision)
-    asked = query_of(query, accuracy, precision)
-    begin, tree_type, state_type = asked.begin, HANDLES[accuracy], STATES[asked.state]
-    frame_type = FRAMES[precision]
-
-    @without_gradient
-    @wp.func
-    def traverse(tree: tree_type, ray: frame_type, lane: int) -> state_type:
-        return traverse_from(tree, ray, lane, begin(ray))
-
-    return traverse
-
-
-@functools.cache
-def make_traversal_from(
-    query: str,
-    accuracy: str,
-    length: int,
-    entries: int,
-    counters: bool,
-    nodes: str = "float32",
-    precision: str = "float32",
-) -> wp.Function:
-    """The same, beginning with what its last argument holds."""
     asked = query_of(query, accuracy, precision)
     in_order: bool = asked.in_order
-    make_triangles, kept_words = TRIANGLES[accuracy, precision]
-    lanes = lanes_of(length, entries, in_order, kept_words, precision)
-    blocks_form = block_form(lanes, nodes, precision)
-    triangles = make_triangles(lanes, blocks_form, entries * (2 if in_order else 1))
+    first_hit_ends: bool = asked.first_hit_ends
+    make_triangles, ray_words = TRIANGLES[accuracy, precision]
+    ray_base = stack_size * (2 if in_order else 1)
+    lanes = lanes_of(length, ray_base + ray_words, precision)
+    blocks, node = block_form(lanes, nodes, precision), NODES[nodes](lanes)
+    triangles = make_triangles(lanes, blocks, ray_base, precision)
     frame_type = FRAMES[precision]
-    visit = make_visit(lanes, NODES[nodes](lanes), entries, in_order, frame_type)
-    if accuracy == "exact":
-        test_leaf = make_exact_leaf_test(asked, lanes, blocks_form, triangles, LEAVES[asked.state])
-    else:
-        test_leaf = make_leaf_test(asked, lanes, blocks_form, triangles, PRECISIONS[precision].real)
-    count_triangles = make_count(blocks_form)
-    node_words: int = NODE_WORDS if nodes == "float32" else COMPRESSED_NODE_WORDS
-    block_words: int = blocks_form.least_words
-    tree_type, best_type, state_type = HANDLES[accuracy], asked.state, STATES[asked.state]
-    one_is_enough: bool = asked.one_is_enough
-    # Where a ray's threads may hold hits whose t round to the same float, they settle which is the best.
-    settles: bool = in_order and length == 1 and (accuracy == "exact" or precision == "float64")
-    settle = (triangles.settle if accuracy == "exact" else settle_doubles(lanes)) if settles else None
-    done = asked.done
+    visit = make_visit(lanes, node, stack_size, in_order, frame_type)
+    real = PRECISIONS[precision].real
+    offer = (make_exact_offer if accuracy == "exact" else make_offer)(asked, lanes, triangles, real)
+    test_leaf = make_leaf_test(asked, lanes, blocks, triangles.candidates, offer, real)
+    count_triangles = make_count(blocks)
+    node_words: int = node.words
+    block_words: int = blocks.least_words
+    tree_type, found_type, result_type = HANDLES[accuracy], asked.state, TRAVERSALS[asked.state]
+    # Hits of a ray's threads whose t round to the same float32 number are compared once more at the end.
+    compares: bool = in_order and length == 1 and (accuracy == "exact" or precision == "float64")
+    keep_nearest: Any = None
+    if compares:
+        keep_nearest = triangles.keep_nearest if accuracy == "exact" else keep_nearest_double(lanes)
     prepare = triangles.prepare
     new_stack, sync = lanes.new_stack, lanes.sync
     store_word, load_word = lanes.store_word, lanes.load_word
@@ -120,136 +87,62 @@ def make_traversal_from(
 
     @without_gradient
     @wp.func
-    def traverse_from(tree: tree_type, ray: frame_type, lane: int, best: best_type) -> state_type:
+    def traverse(tree: tree_type, ray: frame_type, lane: int, found: found_type) -> result_type:
         units = address_of(tree.units)
         words = wp.uint32(tree.units.shape[0])
-        state = state_type()
-        state.best = best
-        state.tmax = box_tmax(ray.tmax)
+        result = result_type()
+        result.found = found
+        result.tmax = box_tmax(ray.tmax)
         stack = new_stack()
         prepare(ray, stack)
-        # Below all others is an entry that is always near enough to be taken, and whose child ends the
-        # traversal.
+        # The bottom of the stack is always near enough to be popped, and its child ends the traversal.
         store_word(stack, 0, ALL_BITS)
         if wp.static(in_order):
-            store_word(stack, entries, wp.cast(-wp.inf, wp.uint32))
-        # int() makes a variable of what would be a constant to Warp.
-        top = int(1)  # noqa: RUF046, UP018
-        child = int(0)  # noqa: RUF046, UP018
-        steps = int(0)  # noqa: RUF046, UP018
+            store_word(stack, stack_size, wp.cast(-wp.inf, wp.uint32))
+        # int() makes variables of what Warp would take for constants.
+        top = int(1)
+        child = int(0)
+        steps = int(0)
         sync()
-        while child != wp.static(END_OF_STACK):
-            begin = child & wp.static(WORD_MASK)
+        while child != END_OF_STACK:
+            begin = child & WORD_MASK
             inner = child >= 0
-            blocks = (child & 7) + 1
-            end = wp.uint32(begin) + wp.uint32(wp.where(inner, node_words, blocks * block_words))
+            block_count = (child & 7) + 1
+            end = wp.uint32(begin) + wp.uint32(wp.where(inner, node_words, block_count * block_words))
             steps += 1
-            if steps > tree.step_limit or top > wp.static(entries - NODE_WIDTH) or end > words:
-                tree.error[0] = wp.static(CORRUPT)
+            if steps > tree.step_limit or top > wp.static(stack_size - NODE_WIDTH) or end > words:
+                tree.error[0] = CORRUPT
                 break
             if inner:
-                top += visit(units, begin, lane, ray, state.tmax, stack, top) - 1
+                top += visit(units, begin, lane, ray, result.tmax, stack, top) - 1
                 sync()
                 if wp.static(counters):
-                    state.inner_nodes += 1
+                    result.inner_nodes += 1
             else:
-                tested = test_leaf(units, begin, blocks, lane, stack, ray.tmin, state.best)
-                state.best = tested.best
+                leaf = test_leaf(units, begin, block_count, lane, stack, ray.tmin, result.found)
+                result.found = leaf.found
                 if wp.static(counters):
-                    state.leaves += 1
-                    last = int(min_reduce(wp.uint32(tested.last)))
-                    state.triangles += count_triangles(units, begin, wp.min(blocks, last + 1))
+                    result.leaves += 1
+                    last = int(min_reduce(wp.uint32(leaf.last)))
+                    result.triangles += count_triangles(units, begin, wp.min(block_count, last + 1))
                 if wp.static(in_order):
-                    state.tmax = unsortable(min_reduce(sortable(box_tmax(state.best.t))))
-                if wp.static(one_is_enough):  # noqa: SIM102
-                    if or_reduce(wp.where(done(state.best), wp.uint32(1), wp.uint32(0))) != wp.uint32(0):
+                    result.tmax = unsortable(min_reduce(sortable(box_tmax(result.found.t))))
+                if wp.static(first_hit_ends):
+                    hit = wp.where(result.found.prim != NO_PRIM, wp.uint32(1), wp.uint32(0))
+                    if or_reduce(hit) != wp.uint32(0):
                         break
                 top -= 1
             child = wp.cast(load_word(stack, top), wp.int32)
             if wp.static(in_order):
-                # Children that have come to lie behind the best hit are passed over.
-                while wp.cast(load_word(stack, entries + top), wp.float32) > state.tmax:
+                # Pop the children that are now behind the best hit.
+                while wp.cast(load_word(stack, stack_size + top), wp.float32) > result.tmax:
                     top -= 1
                     child = wp.cast(load_word(stack, top), wp.int32)
             sync()
-        if wp.static(settles):
-            state.best = settle(units, stack, lane, state.best)
-            own = wp.where(state.best.prim == wp.static(NO_PRIM), wp.inf, box_tmax(state.best.t))
-            state.tmax = unsortable(min_reduce(sortable(own)))
-        return state
+        if wp.static(compares):
+            result.found = keep_nearest(units, stack, lane, result.found)
+            own = wp.where(result.found.prim == NO_PRIM, wp.inf, box_tmax(result.found.t))
+            result.tmax = unsortable(min_reduce(sortable(own)))
+        return result
 
-    return traverse_from
-
-
-def make_count(form: SimpleNamespace) -> wp.Function:
-    """The count of the triangles that blocks of this form hold."""
-    prim_at, block_at = form.prim_at, form.block_at
-
-    @without_gradient
-    @wp.func
-    def count_triangles(units: wp.uint64, begin: int, blocks: int):
-        count = int(0)  # noqa: RUF046, UP018
-        for i in range(blocks):
-            block = block_at(units, begin, i)
-            for j in range(wp.static(BLOCK_WIDTH)):
-                if wp.cast(load_float(units, prim_at(units, block, j)), wp.int32) >= 0:
-                    count += 1
-        return count
-
-    return count_triangles
-
-
-def query_of(query: str, accuracy: str, precision: str = "float32") -> SimpleNamespace:
-    """What is asked of a tree of that accuracy and precision."""
-    return (EXACT_QUERIES if accuracy == "exact" else QUERIES[precision])[query]
-
-
-def make_leaf_test(
-    asked: SimpleNamespace,
-    lanes: SimpleNamespace,
-    form: SimpleNamespace,
-    triangles: SimpleNamespace,
-    real: type,
-) -> wp.Function:
-    """The test of a leaf's blocks: one thread takes all, or eight a triangle each of two blocks at a time."""
-    stack_argument = lanes.stack_argument
-    candidates, solve = triangles.candidates, triangles.solve
-    offer, done = asked.offer, asked.done
-    best_type, leaf_type = asked.state, LEAVES[asked.state]
-    prim_at, block_at = form.prim_at, form.block_at
-    length: int = lanes.triangles_length
-    block_step: int = lanes.block_step
-
-    @without_gradient
-    @wp.func
-    def test_leaf(
-        units: wp.uint64,
-        begin: int,
-        blocks: int,
-        lane: int,
-        stack: stack_argument,
-        tmin: real,
-        best: best_type,
-    ) -> leaf_type:
-        leaf = leaf_type()
-        leaf.best = best
-        leaf.last = 7
-        i = int(lane // wp.static(BLOCK_WIDTH))
-        while i < blocks:
-            block = block_at(units, begin, i)
-            found = candidates(units, block, lane, stack)
-            left = wp.uint32(found[0])
-            while left != wp.uint32(0):
-                j = lowest_lane(left)
-                negative = ((found[1] >> wp.uint32(j)) & wp.uint32(1)) != wp.uint32(0)
-                left = left & (left - wp.uint32(1))
-                triangle = wp.where(length == 1, lane & 3, j)
-                prim = wp.cast(load_float(units, prim_at(units, block, triangle)), wp.int32)
-                leaf.best = offer(leaf.best, tmin, solve(units, block, triangle, stack, negative), prim)
-            if done(leaf.best):
-                leaf.last = i
-                break
-            i += block_step
-        return leaf
-
-    return test_leaf
+    return traverse

@@ -1,29 +1,40 @@
-"""The forms of a triangle block, as layout.h and compressed.h: where its corners and prims stand.
+"""The forms of a triangle block (layout.h, compressed.h): where a block's corners and prims are.
 
-A vertex is found at the word `vertex_at`, its axes `stride` words apart. `block_at` is the i-th block of a
-leaf. `load` reads a vertex of the thread's triangles, `edge` and `edge_at` what lies between the first and
-another: `fast` trees store that, but in compressed blocks.
+All forms offer the same functions. A vertex is at the word `vertex_at`, its axes `stride` words apart.
+`block_at` is the i-th block of a leaf. `load` reads one corner of the thread's triangles on one axis; `edge`
+and `edge_at` read the edge from the first corner to another, which uncompressed blocks of `fast` trees store
+in place of the corner. `used` clears the lanes that hold no triangle.
 """
 
 from types import SimpleNamespace
 
-# mypy: ignore-errors
-# Warp compiles these functions: to mypy they are no Python.
 import warp as wp
 
 from wive.warp_kernels.lanes.lanes import load_float, without_gradient
 from wive.warp_kernels.lanes.native import PICK_1, PICK_4
 from wive.warp_kernels.lanes.precision import PRECISIONS
-from wive.warp_kernels.tree.handle import BLOCK_WORDS, LEAST_COMPRESSED_WORDS, PRIM_ROW
+from wive.warp_kernels.tree.layout import (
+    BLOCK_WIDTH,
+    BLOCK_WORDS,
+    CORNER_BITS,
+    HEADER_WORDS,
+    LEAST_COMPRESSED_WORDS,
+    NUMBER_BITS,
+    PRIM_ROW,
+    USED_SHIFT,
+    VERTICES_SHIFT,
+)
 
 
 def plain_block(lanes: SimpleNamespace, precision: str) -> SimpleNamespace:
-    """Four triangles side by side; NaN fails every test in the lanes that are not used."""
+    """Four triangles side by side; NaN fails every test in the unused lanes."""
     load_triangles = lanes.load_triangles
     numbers = PRECISIONS[precision]
     real, load_number = numbers.real, numbers.load
     words: int = numbers.words
     block_words: int = BLOCK_WORDS * words
+    row_words: int = BLOCK_WIDTH * words
+    vertex_words: int = 3 * row_words
 
     @wp.func
     def block_at(units: wp.uint64, begin: int, i: int):
@@ -31,23 +42,23 @@ def plain_block(lanes: SimpleNamespace, precision: str) -> SimpleNamespace:
 
     @wp.func
     def stride(units: wp.uint64, block: int):
-        return 4 * words
+        return row_words
 
     @wp.func
     def vertex_at(units: wp.uint64, block: int, k: int, j: int):
-        return block + 12 * words * k + words * j
+        return block + vertex_words * k + words * j
 
     @wp.func
     def prim_at(units: wp.uint64, block: int, j: int):
-        return block + wp.static(PRIM_ROW) * words + j
+        return block + PRIM_ROW * words + j
 
     @wp.func
     def load(units: wp.uint64, block: int, lane: int, k: int, axis: int):
-        return load_triangles(units, block + 12 * words * k + 4 * words * axis, lane)
+        return load_triangles(units, block + vertex_words * k + row_words * axis, lane)
 
     @wp.func
     def edge(units: wp.uint64, block: int, lane: int, k: int, axis: int):
-        return load_triangles(units, block + 12 * words * k + 4 * words * axis, lane)
+        return load_triangles(units, block + vertex_words * k + row_words * axis, lane)
 
     @wp.func
     def edge_at(units: wp.uint64, at: int, v0: real):
@@ -61,7 +72,7 @@ def plain_block(lanes: SimpleNamespace, precision: str) -> SimpleNamespace:
 
 
 def compressed_block(lanes: SimpleNamespace) -> SimpleNamespace:
-    """Up to four triangles over six or eight vertices; a word says which lanes are used."""
+    """Up to four triangles over six or eight vertices; the header says which lanes are used."""
     length: int = lanes.triangles_length
     vector = lanes.triangles
 
@@ -70,32 +81,37 @@ def compressed_block(lanes: SimpleNamespace) -> SimpleNamespace:
         return wp.cast(load_float(units, at), wp.uint32)
 
     @wp.func
+    def corner_numbers(units: wp.uint64, block: int, k: int):
+        """The vertex numbers of corner k in the low bits: two corners share a word of the header."""
+        return header(units, block + k // 2) >> wp.uint32(CORNER_BITS * (k % 2))
+
+    @wp.func
     def stride(units: wp.uint64, block: int):
-        return int(header(units, block + 1) >> wp.uint32(20))
+        return int(header(units, block + 1) >> wp.uint32(VERTICES_SHIFT))
 
     @wp.func
     def block_at(units: wp.uint64, begin: int, i: int):
         at = int(begin)
         for _ in range(i):  # rarely more than once
-            at += 4 * stride(units, at)
+            at += 4 * stride(units, at)  # units of eight words, half as many as vertices
         return at
 
     @wp.func
     def vertex_at(units: wp.uint64, block: int, k: int, j: int):
-        number = header(units, block + k // 2) >> wp.uint32(16 * (k % 2) + 4 * j)
-        return block + 2 + int(number & wp.uint32(7))
+        number = corner_numbers(units, block, k) >> wp.uint32(NUMBER_BITS * j)
+        return block + HEADER_WORDS + int(number & wp.uint32(7))
 
     @wp.func
     def prim_at(units: wp.uint64, block: int, j: int):
-        return block + 2 + 3 * stride(units, block) + j
+        return block + HEADER_WORDS + 3 * stride(units, block) + j
 
     @wp.func_native(PICK_4 if length == 4 else PICK_1)
     def pick(units: wp.uint64, row: int, numbers: wp.uint32, lane: int) -> vector: ...
 
     @wp.func
     def load(units: wp.uint64, block: int, lane: int, k: int, axis: int):
-        numbers = header(units, block + k // 2) >> wp.uint32(16 * (k % 2))
-        return pick(units, block + 2 + axis * stride(units, block), numbers, lane)
+        row = block + HEADER_WORDS + axis * stride(units, block)
+        return pick(units, row, corner_numbers(units, block, k), lane)
 
     @wp.func
     def edge(units: wp.uint64, block: int, lane: int, k: int, axis: int):
@@ -107,8 +123,8 @@ def compressed_block(lanes: SimpleNamespace) -> SimpleNamespace:
 
     @wp.func
     def used(units: wp.uint64, block: int, lane: int, passed: wp.uint32):
-        lanes = (header(units, block + 1) >> wp.uint32(16)) & wp.uint32(15)
-        return passed & (lanes >> wp.uint32(wp.where(length == 1, lane & 3, 0)))
+        used_lanes = (header(units, block + 1) >> wp.uint32(USED_SHIFT)) & wp.uint32(15)
+        return passed & (used_lanes >> wp.uint32(wp.where(length == 1, lane & 3, 0)))
 
     return _block(LEAST_COMPRESSED_WORDS, block_at, stride, vertex_at, prim_at, load, edge, edge_at, used)
 
@@ -120,7 +136,7 @@ def _block(least_words: int, *functions: wp.Function) -> SimpleNamespace:
 
 
 def block_form(lanes: SimpleNamespace, nodes: str, precision: str) -> SimpleNamespace:
-    """The blocks of a tree with this form of nodes: those of float64 are never compressed."""
+    """The block form of a tree with this node form: blocks of float64 are never compressed."""
     if nodes == "compressed" and precision == "float32":
         return compressed_block(lanes)
     return plain_block(lanes, precision)

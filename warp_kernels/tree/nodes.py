@@ -1,13 +1,21 @@
-"""The two forms of a node, as layout.h and compressed.h: what a visit reads, and for which lanes."""
+"""The two node forms (layout.h, compressed.h): what a visit reads of a node, for either lane form."""
 
 from types import SimpleNamespace
 
-# mypy: ignore-errors
-# Warp compiles these functions: to mypy they are no Python.
 import warp as wp
 
 from wive.warp_kernels.lanes.native import BYTE_DISTANCES_1, BYTE_DISTANCES_8, RANKS_1, RANKS_8
-from wive.warp_kernels.tree.handle import ALL_BITS, CHILD_ROW, COMPRESSED_CHILD_ROW, RANK_ROW
+from wive.warp_kernels.tree.layout import (
+    ALL_BITS,
+    CHILD_ROW,
+    COMPRESSED_CHILD_ROW,
+    COMPRESSED_NODE_WORDS,
+    COMPRESSED_RANK_BITS,
+    NODE_WIDTH,
+    NODE_WORDS,
+    RANK_BITS,
+    RANK_ROW,
+)
 
 
 @wp.func
@@ -26,21 +34,26 @@ def float32_node(lanes: SimpleNamespace) -> SimpleNamespace:
 
     @wp.func
     def distances(units: wp.uint64, node: int, lane: int, axis: int, row: int, rdir: float, bias: float):
-        """From the origin to a row of planes, along the ray."""
-        return plane_distances(units, node + 8 * row, lane, rdir, bias)
+        """Distances along the ray from its origin to a row of planes."""
+        return plane_distances(units, node + NODE_WIDTH * row, lane, rdir, bias)
 
     @wp.func
     def ranks(units: wp.uint64, node: int, lane: int):
         """Each child's place in the order of every octant."""
-        return load_row(units, node + wp.static(RANK_ROW), lane)
+        return load_row(units, node + RANK_ROW, lane)
 
     return SimpleNamespace(
-        distances=distances, ranks=ranks, rank_bits=4, child_row=CHILD_ROW, has_child=_always
+        words=NODE_WORDS,
+        distances=distances,
+        ranks=ranks,
+        rank_bits=RANK_BITS,
+        child_row=CHILD_ROW,
+        has_child=_always,
     )
 
 
 def compressed_node(lanes: SimpleNamespace) -> SimpleNamespace:
-    """Rows of bytes on the grid of an origin and three steps; empty lanes have no child."""
+    """Rows of bytes on a grid given by an origin and three steps; empty lanes have no child."""
     vector, words = lanes.vector, lanes.words
     eight: bool = lanes.length == 8
 
@@ -53,7 +66,12 @@ def compressed_node(lanes: SimpleNamespace) -> SimpleNamespace:
     def ranks(units: wp.uint64, node: int, lane: int) -> words: ...
 
     return SimpleNamespace(
-        distances=distances, ranks=ranks, rank_bits=3, child_row=COMPRESSED_CHILD_ROW, has_child=_has_child
+        words=COMPRESSED_NODE_WORDS,
+        distances=distances,
+        ranks=ranks,
+        rank_bits=COMPRESSED_RANK_BITS,
+        child_row=COMPRESSED_CHILD_ROW,
+        has_child=_has_child,
     )
 
 

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import warp as wp
 
 
-def hush() -> None:
+def set_quiet() -> None:
     """Hide Warp's messages about itself (version, devices, modules compiled), unless a level was set."""
     if wp.config.log_level == wp.LOG_INFO:
         wp.config.log_level = wp.LOG_WARNING
@@ -16,7 +16,7 @@ def hush() -> None:
 
 @contextlib.contextmanager
 def cpu_blocks(enabled: bool) -> Iterator[None]:
-    """Within it, blocks of several threads run on Warp's CPU device as fibers, where `enabled`."""
+    """A context in which Warp's CPU device runs blocks of several threads as fibers, if `enabled`."""
     before = wp.config.enable_cpu_blocks
     wp.config.enable_cpu_blocks = before or enabled
     try:

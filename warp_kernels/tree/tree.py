@@ -1,4 +1,4 @@
-"""The tree on a Warp device."""
+"""A tree on a Warp device: its upload, and the check that kernels could traverse it."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -10,24 +10,30 @@ from numpy.typing import NDArray
 from wive import _cpu
 from wive.warp_kernels.tree.handle import (
     ACCURACIES,
-    BLOCK_WORDS,
     COMPRESSED,
-    COMPRESSED_NODE_WORDS,
     CORRUPT,
     FLOAT64,
     HANDLES,
-    LEAST_COMPRESSED_WORDS,
-    NODE_WIDTH,
-    NODE_WORDS,
     STACK_TOO_SMALL,
-    WORD_MASK,
     WRONG_ACCURACY,
 )
-from wive.warp_kernels.tree.quiet import hush
+from wive.warp_kernels.tree.layout import (
+    BLOCK_WORDS,
+    CHILD_ROW,
+    COMPRESSED_CHILD_ROW,
+    COMPRESSED_NODE_WORDS,
+    LEAST_COMPRESSED_WORDS,
+    MAX_DEPTH,
+    NODE_WIDTH,
+    NODE_WORDS,
+    UNIT_WORDS,
+    WORD_MASK,
+)
+from wive.warp_kernels.tree.quiet import set_quiet
 from wive.warp_kernels.tree.ranks import INVERT_ORDERS
 
-MAX_DEPTH = 64  # cpu/core/layout.h
-STACK_SIZES = (32, 64, 96, 128, 256, 512)  # kernels are compiled for the least that a tree can do with
+# Kernels are compiled for the smallest of these sizes that the tree can't overflow.
+STACK_SIZES = (32, 64, 96, 128, 256, 512)
 
 _REASONS = {
     CORRUPT: "a traversal left the tree or did not end: the tree's memory was overwritten",
@@ -40,16 +46,16 @@ _REASONS = {
 
 
 class CorruptTreeError(RuntimeError):
-    """A kernel could not traverse the tree; what it wrote is worthless."""
+    """A kernel could not traverse the tree; its outputs are meaningless."""
 
 
 @dataclass(frozen=True)
 class Tree:
     """A tree on a Warp device, made by `upload`.
 
-    `handle` is what kernels take, by accuracy a `Bvh`, `FastBvh` or `ExactBvh`. `stack` is the number of
-    stack entries its kernels are compiled for, `nodes` is "float32" or "compressed", `precision` "float32" or
-    "float64". `memory` counts bytes on the device.
+    `handle` is what kernels take: a `Bvh`, `FastBvh` or `ExactBvh`, depending on the accuracy. `stack` is the
+    stack size that its kernels are compiled for, `nodes` is "float32" or "compressed", `precision` "float32"
+    or "float64".
     """
 
     device: wp.Device
@@ -70,15 +76,15 @@ class Tree:
 def upload(bvh: _cpu.Bvh, device: wp.DeviceLike = None) -> Tree:
     """Copy the tree to a Warp device ("cpu", "cuda:0", ...; None is Warp's current device).
 
-    The copy differs in one row of each node: `order` says which child comes i-th, and is turned into the rank
-    of each child, so that a lane knows its place without asking another.
+    The copy differs in one row of each node: `order`, which says which child comes i-th, is turned into the
+    rank of each child, so that a lane knows its place without reading another lane.
     """
-    hush()
+    set_quiet()
     place = wp.get_device(device)
     nodes = bvh.nodes
     units: wp.array[Any] = wp.array(bvh.units.reshape(-1).view(np.float32), dtype=wp.float32, device=place)
     error = wp.zeros(1, dtype=wp.int32, device=place)
-    needed = stack_entries(nodes)
+    needed = stack_size(nodes)
     wp.launch(
         INVERT_ORDERS[bvh.node_form],
         dim=len(nodes),
@@ -94,10 +100,10 @@ def upload(bvh: _cpu.Bvh, device: wp.DeviceLike = None) -> Tree:
     handle.center = wp.vec3(*bvh.center.tolist())
     handle.extent = wp.vec3(*bvh.extent.tolist())
     compressed, double = bvh.node_form == "compressed", bvh.precision == "float64"
-    # In units, no node is met twice, nor is a leaf.
-    node = (COMPRESSED_NODE_WORDS if compressed else NODE_WORDS) // 8
-    block = BLOCK_WORDS // 4 if double else (LEAST_COMPRESSED_WORDS if compressed else BLOCK_WORDS) // 8
-    handle.step_limit = len(bvh.units) // min(node, block) + 1
+    # A traversal meets no node and no leaf twice.
+    node_words = COMPRESSED_NODE_WORDS if compressed else NODE_WORDS
+    block_words = 2 * BLOCK_WORDS if double else LEAST_COMPRESSED_WORDS if compressed else BLOCK_WORDS
+    handle.step_limit = len(bvh.units) // (min(node_words, block_words) // UNIT_WORDS) + 1
     handle.stack = needed
     handle.accuracy = ACCURACIES.index(bvh.accuracy)
     handle.refusal = FLOAT64 if double else COMPRESSED if compressed else 0
@@ -115,27 +121,26 @@ def upload(bvh: _cpu.Bvh, device: wp.DeviceLike = None) -> Tree:
 
 
 def check(tree: Tree) -> None:
-    """Wait for the device and raise CorruptTreeError where a kernel could not traverse the tree."""
+    """Wait for the device and raise CorruptTreeError if a kernel could not traverse the tree."""
     reason = int(tree.error.numpy()[0])
     if reason:
         raise CorruptTreeError(f"tree on {tree.device}: {_REASONS[reason]}")
 
 
-def stack_entries(nodes: NDArray[np.uint32]) -> int:
-    """The most entries that a traversal can have on its stack, and room for eight more.
+def stack_size(nodes: NDArray[np.uint32]) -> int:
+    """The most children that a traversal can have on its stack, and room for eight more.
 
     nodes: (m,8,8), or (m,4,8) compressed.
 
-    A visit pushes at most all children, of which one is taken before the next visit. Below them is the entry
-    that ends the traversal.
+    A visit pushes at most all children of a node; one of them is popped before the next visit. Below them is
+    the entry that ends the traversal.
     """
     if nodes.shape[1] == 8:
-        children, planes = nodes[:, 6], nodes.view(np.float32)
+        node_words, children, planes = NODE_WORDS, nodes[:, CHILD_ROW // 8], nodes.view(np.float32)
         used = planes[:, 0] <= planes[:, 1]
     else:
-        children = nodes[:, 3]
+        node_words, children = COMPRESSED_NODE_WORDS, nodes[:, COMPRESSED_CHILD_ROW // 8]
         used = children != 0xFFFFFFFF
-    node_words = NODE_WORDS if nodes.shape[1] == 8 else COMPRESSED_NODE_WORDS
     level, held, most = np.zeros(1, np.int64), np.zeros(1, np.int64), 0
     for _ in range(MAX_DEPTH):
         filled = used[level]

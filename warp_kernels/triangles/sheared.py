@@ -1,9 +1,7 @@
-"""The edge functions of the watertight test, in all lanes at once and in either precision."""
+"""Edge functions of the watertight test, in all lanes at once and in either precision."""
 
 from types import SimpleNamespace
 
-# mypy: ignore-errors
-# Warp compiles these functions: to mypy they are no Python.
 import warp as wp
 
 from wive.warp_kernels.lanes.lanes import without_gradient
@@ -11,13 +9,17 @@ from wive.warp_kernels.lanes.lanes import without_gradient
 
 def edges_in_lanes(
     lanes: SimpleNamespace,
-    form: SimpleNamespace,
+    blocks: SimpleNamespace,
     axis_of: wp.Function,
-    kept_origin: wp.Function,
-    kept_shear: wp.Function,
+    origin_of: wp.Function,
+    shear_of: wp.Function,
 ) -> wp.Function:
-    """Edge functions opposite to each corner of a block's triangles, from what the stack keeps of a ray."""
-    vector, products, load = lanes.triangles, lanes.products, form.load
+    """The edge functions opposite to each corner of a block's triangles.
+
+    The three functions read what the stack keeps of the ray: the mesh axis of a sheared axis, and the origin
+    and the shear on a sheared axis.
+    """
+    vector, products, load = lanes.triangles, lanes.products, blocks.load
     stack_argument = lanes.stack_argument
 
     @without_gradient
@@ -26,11 +28,11 @@ def edges_in_lanes(
         x = axis_of(stack, 0)
         y = axis_of(stack, 1)
         z = axis_of(stack, 2)
-        ox = vector(kept_origin(stack, 0))
-        oy = vector(kept_origin(stack, 1))
-        oz = vector(kept_origin(stack, 2))
-        sx = vector(kept_shear(stack, 0))
-        sy = vector(kept_shear(stack, 1))
+        ox = vector(origin_of(stack, 0))
+        oy = vector(origin_of(stack, 1))
+        oz = vector(origin_of(stack, 2))
+        sx = vector(shear_of(stack, 0))
+        sy = vector(shear_of(stack, 1))
         za = load(units, block, lane, 0, z) - oz
         zb = load(units, block, lane, 1, z) - oz
         zc = load(units, block, lane, 2, z) - oz

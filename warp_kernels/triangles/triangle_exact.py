@@ -1,34 +1,45 @@
-"""Exact hits on a block's triangles, as cpu/traverse/triangle_exact.h: a filter in double, then integers."""
+"""The exact triangle test: a filter in double, then integers, as cpu/traverse/triangle_exact.h."""
 
 from types import SimpleNamespace
 
-# mypy: ignore-errors
-# Warp compiles these functions: to mypy they are no Python.
 import warp as wp
 
 from wive.warp_kernels.lanes.exact_native import (
     compare_distances,
     lies_within,
-    may_meet,
+    may_hit,
     solve_exactly,
 )
-from wive.warp_kernels.lanes.lanes import load_float, lowest_lane, product, without_gradient
+from wive.warp_kernels.lanes.lanes import lowest_lane, product, without_gradient
+from wive.warp_kernels.lanes.precision import stack_numbers
 from wive.warp_kernels.queries.frame import RayFrame, axes_of, component
+from wive.warp_kernels.queries.query import Query
 from wive.warp_kernels.queries.query_exact import ExactBest
-from wive.warp_kernels.tree.handle import BLOCK_WIDTH, NO_PRIM
+from wive.warp_kernels.tree.layout import NO_PRIM
 
-# What the test keeps of a ray: the longest axis, the origin, the caller's direction and limits, the scale of
-# its t, and three doubles of two words each: the direction on the other two axes over that on the longest,
-# and 1 over that.
-KEPT_WORDS = 16
-SMALLEST_SLOPE = wp.constant(wp.float64(2.0**-100))
+# What the test keeps of a ray, in words: the longest axis, then floats: origin, the caller's direction (three
+# each) and limits, and t in the frame's units over the caller's t.
+LONGEST_AXIS = 0
+ORIGIN = 1
+DIRECTION = 4
+TMIN = 7
+TMAX = 8
+UNSCALE = 9
+# Then doubles, of which these are the first: the direction on the other two axes over that on the longest,
+# and one over that on the longest.
+DOUBLE_WORDS = 10
+SHEAR = 0
+INVERSE = 2
+RAY_WORDS = DOUBLE_WORDS + 2 * 3
+
+SMALLEST_SHEAR = wp.constant(wp.float64(2.0**-100))
 SUBNORMAL_STEP = wp.constant(wp.float32(2.0**-148))
 
 
 @wp.func
-def slope_of(slope: wp.float64):
-    """Smaller slopes move nothing by as much as rounding does; without them no product underflows."""
-    return wp.where(wp.abs(slope) < SMALLEST_SLOPE, wp.float64(0.0), slope)
+def shear_of(shear: wp.float64):
+    """The shear, or zero if it moves nothing by as much as rounding does: so no product underflows."""
+    return wp.where(wp.abs(shear) < SMALLEST_SHEAR, wp.float64(0.0), shear)
 
 
 @wp.func
@@ -37,57 +48,45 @@ def block_of(place: int):
     return place & -8
 
 
-def exact_triangles(lanes: SimpleNamespace, form: SimpleNamespace, kept: int) -> SimpleNamespace:
-    """The test for these lanes and blocks, its ray kept from word `kept` of the stack.
+def exact_triangles(
+    lanes: SimpleNamespace, blocks: SimpleNamespace, ray_base: int, precision: str
+) -> SimpleNamespace:
+    """The test for a lane form and block form; its ray is kept from stack word `ray_base` on.
 
     A triangle's place is one number: the word of its block, a multiple of eight, plus its lane.
     """
     length: int = lanes.triangles_length
-    used, stride_of, vertex_at = form.used, form.stride, form.vertex_at
+    used, stride_of, vertex_at = blocks.used, blocks.stride, blocks.vertex_at
     store_word, load_word, stack_argument = lanes.store_word, lanes.load_word, lanes.stack_argument
     or_reduce = lanes.or_reduce
-
-    @without_gradient
-    @wp.func
-    def store_double(stack: stack_argument, at: int, x: wp.float64):
-        bits = wp.cast(x, wp.uint64)
-        store_word(stack, at, wp.uint32(bits & wp.uint64(0xFFFFFFFF)))
-        store_word(stack, at + 1, wp.uint32(bits >> wp.uint64(32)))
-
-    @without_gradient
-    @wp.func
-    def load_double(stack: stack_argument, at: int):
-        high = wp.uint64(load_word(stack, at + 1))
-        return wp.cast(wp.uint64(load_word(stack, at)) | (high << wp.uint64(32)), wp.float64)
-
-    @without_gradient
-    @wp.func
-    def kept_number(stack: stack_argument, at: int):
-        return wp.cast(load_word(stack, kept + at), wp.float32)
-
-    @without_gradient
-    @wp.func
-    def kept_vector(stack: stack_argument, at: int):
-        """The three numbers from `at`: 1 for the origin, 4 for the direction."""
-        return wp.vec3(kept_number(stack, at), kept_number(stack, at + 1), kept_number(stack, at + 2))
+    numbers = stack_numbers(lanes, "float32", ray_base)
+    doubles = stack_numbers(lanes, "float64", ray_base + DOUBLE_WORDS)
+    store, load, load_vector = numbers.store, numbers.load, numbers.load_vector
+    store_double, load_double = doubles.store, doubles.load
 
     @without_gradient
     @wp.func
     def prepare(ray: RayFrame, stack: stack_argument):
         """Keep what the test needs of a ray."""
         axes = axes_of(ray.longest_axis)
-        store_word(stack, kept, wp.uint32(ray.longest_axis))
+        store_word(stack, ray_base + LONGEST_AXIS, wp.uint32(ray.longest_axis))
         for i in range(3):
-            store_word(stack, kept + 1 + i, wp.cast(ray.origin[i], wp.uint32))
-            store_word(stack, kept + 4 + i, wp.cast(ray.given_direction[i], wp.uint32))
-        store_word(stack, kept + 7, wp.cast(ray.given_tmin, wp.uint32))
-        store_word(stack, kept + 8, wp.cast(ray.given_tmax, wp.uint32))
-        store_word(stack, kept + 9, wp.cast(1.0 / ray.scale, wp.uint32))
+            store(stack, ORIGIN + i, ray.origin[i])
+            store(stack, DIRECTION + i, ray.given_direction[i])
+        store(stack, TMIN, ray.given_tmin)
+        store(stack, TMAX, ray.given_tmax)
+        store(stack, UNSCALE, 1.0 / ray.scale)
         inverse = wp.float64(1.0) / wp.float64(component(ray.given_direction, axes[2]))
         for i in range(2):
-            slope = wp.float64(component(ray.given_direction, axes[i])) * inverse
-            store_double(stack, kept + 10 + 2 * i, slope_of(slope))
-        store_double(stack, kept + 14, inverse)
+            shear = wp.float64(component(ray.given_direction, axes[i])) * inverse
+            store_double(stack, SHEAR + i, shear_of(shear))
+        store_double(stack, INVERSE, inverse)
+
+    @without_gradient
+    @wp.func
+    def axes_kept(stack: stack_argument):
+        """The mesh axes of the sheared axes."""
+        return axes_of(int(load_word(stack, ray_base + LONGEST_AXIS)))
 
     @without_gradient
     @wp.func
@@ -100,46 +99,48 @@ def exact_triangles(lanes: SimpleNamespace, form: SimpleNamespace, kept: int) ->
     @without_gradient
     @wp.func
     def candidates(units: wp.uint64, block: int, lane: int, stack: stack_argument):
-        """The lanes whose triangle the ray's line may meet, one bit each."""
-        axes = axes_of(int(load_word(stack, kept)))
-        origin = kept_vector(stack, 1)
-        shear_x = load_double(stack, kept + 10)
-        shear_y = load_double(stack, kept + 12)
+        """The lanes whose triangle the ray's line may hit, one bit each; the second word is not used."""
+        axes = axes_kept(stack)
+        origin = load_vector(stack, ORIGIN)
+        shear_x = load_double(stack, SHEAR)
+        shear_y = load_double(stack, SHEAR + 1)
         stride = stride_of(units, block)
-        found = wp.uint32(0)
+        hit_mask = wp.uint32(0)
         for i in range(length):
             at = vertices_of(units, block, wp.where(length == 1, lane & 3, i))
-            if may_meet(units, at, stride, axes, origin, shear_x, shear_y):
-                found = found | wp.uint32(1 << i)
-        return used(units, block, lane, found)
+            if may_hit(units, at, stride, axes, origin, shear_x, shear_y):
+                hit_mask = hit_mask | wp.uint32(1 << i)
+        return wp.vec2ui(used(units, block, lane, hit_mask), wp.uint32(0))
 
     @without_gradient
     @wp.func(inline=False)
-    def solve(units: wp.uint64, block: int, j: int, stack: stack_argument, best_t: float, crossings: bool):
-        """t, u, v and 1; a 0 last where the ray misses the triangle or meets it outside its limits.
+    def solve(
+        units: wp.uint64, block: int, j: int, stack: stack_argument, best_t: float, perturb_edges: bool
+    ):
+        """t, u, v and 1; the last is 0 if the ray misses the triangle or hits it outside its limits.
 
-        Also where it meets it beyond best_t, in the caller's units.
+        It is 0 also for a hit beyond best_t, which is in the caller's units.
         """
         at = vertices_of(units, block, j)
         stride = stride_of(units, block)
-        origin = kept_vector(stack, 1)
-        direction = kept_vector(stack, 4)
+        origin = load_vector(stack, ORIGIN)
+        direction = load_vector(stack, DIRECTION)
         hit = solve_exactly(
             units,
             at,
             stride,
-            axes_of(int(load_word(stack, kept))),
+            axes_kept(stack),
             origin,
             direction,
-            load_double(stack, kept + 10),
-            load_double(stack, kept + 12),
-            load_double(stack, kept + 14),
-            kept_number(stack, 7),
-            wp.min(best_t, kept_number(stack, 8)),
-            crossings,
+            load_double(stack, SHEAR),
+            load_double(stack, SHEAR + 1),
+            load_double(stack, INVERSE),
+            load(stack, TMIN),
+            wp.min(best_t, load(stack, TMAX)),
+            perturb_edges,
         )
         if hit[3] != 0.0 and not lies_within(
-            units, at, stride, origin, direction, hit[0], kept_number(stack, 7), kept_number(stack, 8)
+            units, at, stride, origin, direction, hit[0], load(stack, TMIN), load(stack, TMAX)
         ):
             hit[3] = 0.0
         return hit
@@ -149,7 +150,7 @@ def exact_triangles(lanes: SimpleNamespace, form: SimpleNamespace, kept: int) ->
     def comes_before(
         units: wp.uint64, place: int, prim: int, other: int, other_prim: int, stack: stack_argument
     ):
-        """Whether a hit whose t rounds to the same as another's is nearer, or as near and of a lower prim."""
+        """Whether a hit is nearer than another of the same rounded t, or as near and of a lower prim."""
         block = block_of(place)
         other_block = block_of(other)
         order = compare_distances(
@@ -158,8 +159,8 @@ def exact_triangles(lanes: SimpleNamespace, form: SimpleNamespace, kept: int) ->
             stride_of(units, block),
             vertices_of(units, other_block, other - other_block),
             stride_of(units, other_block),
-            kept_vector(stack, 1),
-            kept_vector(stack, 4),
+            load_vector(stack, ORIGIN),
+            load_vector(stack, DIRECTION),
         )
         return order < 0 or (order == 0 and prim < other_prim)
 
@@ -169,7 +170,7 @@ def exact_triangles(lanes: SimpleNamespace, form: SimpleNamespace, kept: int) ->
         best: ExactBest, units: wp.uint64, place: int, stack: stack_argument, hit: wp.vec4, prim: int
     ):
         """The nearest hit; of hits at the same t, the lowest prim."""
-        nearer = best.prim == wp.static(NO_PRIM) or hit[0] < best.given_t
+        nearer = best.prim == NO_PRIM or hit[0] < best.given_t
         if not nearer and hit[0] == best.given_t:
             nearer = comes_before(units, place, prim, best.place, best.prim, stack)
         if nearer:
@@ -178,16 +179,16 @@ def exact_triangles(lanes: SimpleNamespace, form: SimpleNamespace, kept: int) ->
             best.v = hit[2]
             best.prim = prim
             best.place = place
-            # Boxes are lowered by more than t was rounded, except where t is a subnormal number.
-            best.t = product(hit[0] + SUBNORMAL_STEP, kept_number(stack, 9))
+            # Boxes are lowered by more than t was rounded, except when t is a subnormal number.
+            best.t = product(hit[0] + SUBNORMAL_STEP, load(stack, UNSCALE))
         return best
 
     @without_gradient
     @wp.func
-    def settle(units: wp.uint64, stack: stack_argument, lane: int, best: ExactBest):
-        """Take the hits of a ray's threads but one for no hits: the best of all."""
-        rivals = or_reduce(wp.where(best.prim == wp.static(NO_PRIM), wp.uint32(0), wp.uint32(1 << lane)))
-        beaten = bool(False)  # noqa: UP018
+    def keep_nearest(units: wp.uint64, stack: stack_argument, lane: int, best: ExactBest):
+        """Keep the nearest hit among a ray's eight threads; the other seven report a miss."""
+        rivals = or_reduce(wp.where(best.prim == NO_PRIM, wp.uint32(0), wp.uint32(1 << lane)))
+        beaten = bool(False)
         while rivals != wp.uint32(0):
             i = lowest_lane(rivals)
             rivals = rivals & (rivals - wp.uint32(1))
@@ -196,74 +197,54 @@ def exact_triangles(lanes: SimpleNamespace, form: SimpleNamespace, kept: int) ->
             )
             place = int(or_reduce(wp.where(lane == i, wp.uint32(best.place), wp.uint32(0))))
             prim = int(or_reduce(wp.where(lane == i, wp.uint32(best.prim), wp.uint32(0))))
-            if lane != i and best.prim != wp.static(NO_PRIM):
+            if lane != i and best.prim != NO_PRIM:
                 if t < best.given_t:
                     beaten = True
                 if t == best.given_t and comes_before(units, place, prim, best.place, best.prim, stack):
                     beaten = True
         if beaten:
-            best.prim = wp.static(NO_PRIM)
+            best.prim = NO_PRIM
         return best
 
     return SimpleNamespace(
-        prepare=prepare, candidates=candidates, solve=solve, take_closest=take_closest, settle=settle
+        prepare=prepare,
+        candidates=candidates,
+        solve=solve,
+        take_closest=take_closest,
+        keep_nearest=keep_nearest,
     )
 
 
-def make_exact_leaf_test(
-    asked: SimpleNamespace,
-    lanes: SimpleNamespace,
-    form: SimpleNamespace,
-    triangles: SimpleNamespace,
-    leaf_type: type,
+def make_exact_offer(
+    query: Query, lanes: SimpleNamespace, triangles: SimpleNamespace, real: type
 ) -> wp.Function:
-    """The test of a leaf's blocks in exact trees: one thread takes all, or eight a triangle each."""
-    stack_argument = lanes.stack_argument
-    candidates, solve = triangles.candidates, triangles.solve
-    take, take_closest, done = asked.take, triangles.take_closest, asked.done
-    compares: bool = take is None
-    crossings: bool = asked.crossings
-    best_type = asked.state
-    prim_at, block_at = form.prim_at, form.block_at
-    length: int = lanes.triangles_length
-    block_step: int = lanes.block_step
+    """The function that solves a triangle exactly and offers a hit within the limits to the query."""
+    stack_argument, state_type = lanes.stack_argument, query.state
+    solve, offer, take_closest = triangles.solve, query.offer, triangles.take_closest
+    compares: bool = offer is None
+    perturb_edges: bool = query.perturb_edges
 
     @without_gradient
     @wp.func
-    def test_leaf(
+    def offer_triangle(
+        found: state_type,
         units: wp.uint64,
-        begin: int,
-        blocks: int,
-        lane: int,
+        block: int,
+        j: int,
+        prim: int,
+        negative: bool,
+        tmin: real,
         stack: stack_argument,
-        tmin: float,
-        best: best_type,
-    ) -> leaf_type:
-        leaf = leaf_type()
-        leaf.best = best
-        leaf.last = 7
-        i = int(lane // wp.static(BLOCK_WIDTH))
-        while i < blocks:
-            block = block_at(units, begin, i)
-            left = wp.uint32(candidates(units, block, lane, stack))
-            while left != wp.uint32(0):
-                j = lowest_lane(left)
-                left = left & (left - wp.uint32(1))
-                triangle = wp.where(length == 1, lane & 3, j)
-                prim = wp.cast(load_float(units, prim_at(units, block, triangle)), wp.int32)
-                best_t = float(wp.inf)
-                if wp.static(compares):
-                    best_t = leaf.best.given_t
-                hit = solve(units, block, triangle, stack, best_t, crossings)
-                if hit[3] != 0.0:
-                    if wp.static(compares):
-                        leaf.best = take_closest(leaf.best, units, block + triangle, stack, hit, prim)
-                    else:
-                        leaf.best = take(leaf.best, hit, prim)
-            if done(leaf.best):
-                leaf.last = i
-                break
-            i += block_step
-        return leaf
+    ):
+        best_t = float(wp.inf)
+        if wp.static(compares):
+            best_t = found.given_t
+        hit = solve(units, block, j, stack, best_t, perturb_edges)
+        if hit[3] != 0.0:
+            if wp.static(compares):
+                found = take_closest(found, units, block + j, stack, hit, prim)
+            else:
+                found = offer(found, hit, prim)
+        return found
 
-    return test_leaf
+    return offer_triangle

@@ -1,31 +1,34 @@
-"""Moeller and Trumbore 1997 on the triangles of a block, operation by operation as triangle_fast.h."""
+"""The fast triangle test: Moeller and Trumbore 1997.
+
+Operation by operation as cpu/traverse/triangle_fast.h.
+"""
 
 from types import SimpleNamespace
 
-# mypy: ignore-errors
-# Warp compiles these functions: to mypy they are no Python.
 import warp as wp
 
 from wive.warp_kernels.lanes.lanes import without_gradient
-from wive.warp_kernels.lanes.precision import PRECISIONS, kept_numbers
+from wive.warp_kernels.lanes.precision import PRECISIONS, stack_numbers
 from wive.warp_kernels.queries.frame import FRAMES, flip_sign
 
-# What the test keeps of a ray behind the stack's entries, in float32: origin and direction.
-KEPT_WORDS = 6
+# The numbers that the test keeps of a ray, three each.
+ORIGIN = 0
+DIRECTION = 3
+RAY_NUMBERS = 6
 
 
 def fast_triangles(
-    lanes: SimpleNamespace, form: SimpleNamespace, kept: int, precision: str = "float32"
+    lanes: SimpleNamespace, blocks: SimpleNamespace, ray_base: int, precision: str
 ) -> SimpleNamespace:
-    """The test for these lanes, blocks and numbers, its ray kept from word `kept` of the stack."""
+    """The test for a lane form, block form and precision; its ray is kept from stack word `ray_base` on."""
     length: int = lanes.triangles_length
     vector, products = lanes.triangles, lanes.products
-    load, edge, edge_at, used = form.load, form.edge, form.edge_at, form.used
-    stride_of, vertex_at = form.stride, form.vertex_at
+    load, edge, edge_at, used = blocks.load, blocks.edge, blocks.edge_at, blocks.used
+    stride_of, vertex_at = blocks.stride, blocks.vertex_at
     stack_argument, frame_type = lanes.stack_argument, FRAMES[precision]
-    numbers, ray_numbers = PRECISIONS[precision], kept_numbers(lanes, precision, kept)
+    numbers, ray_numbers = PRECISIONS[precision], stack_numbers(lanes, precision, ray_base)
     real, vec3, product, load_number = numbers.real, numbers.vec3, numbers.product, numbers.load
-    store, kept_vector = ray_numbers.store, ray_numbers.load_vector
+    store, load_vector = ray_numbers.store, ray_numbers.load_vector
 
     @wp.func
     def cross(a: vec3, b: vec3):
@@ -44,13 +47,13 @@ def fast_triangles(
     def prepare(ray: frame_type, stack: stack_argument):
         """Keep what the test needs of a ray."""
         for axis in range(3):
-            store(stack, axis, ray.origin[axis])
-            store(stack, 3 + axis, ray.direction[axis])
+            store(stack, ORIGIN + axis, ray.origin[axis])
+            store(stack, DIRECTION + axis, ray.direction[axis])
 
     @without_gradient
     @wp.func
     def edge_vector(units: wp.uint64, at: int, stride: int, v0: vec3):
-        """From v0 to the vertex at this word."""
+        """The edge from v0 to the vertex at this word."""
         return vec3(
             edge_at(units, at, v0[0]),
             edge_at(units, at + stride, v0[1]),
@@ -60,7 +63,7 @@ def fast_triangles(
     @without_gradient
     @wp.func
     def solve(units: wp.uint64, block: int, j: int, stack: stack_argument, negative: bool):
-        """t, u and v of the block's triangle j, which the ray meets."""
+        """t, u and v of the block's triangle j, which the ray's line hits."""
         stride = stride_of(units, block)
         at = vertex_at(units, block, 0, j)
         v0 = vec3(
@@ -68,9 +71,9 @@ def fast_triangles(
         )
         e1 = edge_vector(units, vertex_at(units, block, 1, j), stride, v0)
         e2 = edge_vector(units, vertex_at(units, block, 2, j), stride, v0)
-        d = kept_vector(stack, 3)
+        d = load_vector(stack, DIRECTION)
         p = cross(d, e2)
-        s = kept_vector(stack, 0) - v0
+        s = load_vector(stack, ORIGIN) - v0
         q = cross(s, e1)
         det = dot(e1, p)
         size = wp.abs(det)
@@ -80,9 +83,9 @@ def fast_triangles(
     @without_gradient
     @wp.func
     def candidates(units: wp.uint64, block: int, lane: int, stack: stack_argument):
-        """The lanes whose triangle the ray's line meets, one bit each; the second word is not used."""
-        o = kept_vector(stack, 0)
-        d = kept_vector(stack, 3)
+        """The lanes whose triangle the ray's line hits, one bit each; the second word is not used."""
+        o = load_vector(stack, ORIGIN)
+        d = load_vector(stack, DIRECTION)
         d0 = vector(d[0])
         d1 = vector(d[1])
         d2 = vector(d[2])
@@ -104,7 +107,7 @@ def fast_triangles(
         det = products(e1x, px) + products(e1y, py) + products(e1z, pz)
         us = products(sx, px) + products(sy, py) + products(sz, pz)
         vs = products(d0, qx) + products(d1, qy) + products(d2, qz)
-        lanes = wp.uint32(0)
+        hit_mask = wp.uint32(0)
         for i in range(length):
             size = wp.abs(det[i])
             u = flip_sign(us[i], det[i])
@@ -112,12 +115,7 @@ def fast_triangles(
             # A determinant of zero (a ray in the triangle's plane) and NaN (an unused lane) must fail.
             zero = real(0.0)
             if u >= zero and v >= zero and u + v <= size and size > zero:
-                lanes = lanes | wp.uint32(1 << i)
-        return wp.vec2ui(used(units, block, lane, lanes), wp.uint32(0))
+                hit_mask = hit_mask | wp.uint32(1 << i)
+        return wp.vec2ui(used(units, block, lane, hit_mask), wp.uint32(0))
 
     return SimpleNamespace(prepare=prepare, candidates=candidates, solve=solve)
-
-
-def double_triangles(lanes: SimpleNamespace, form: SimpleNamespace, kept: int) -> SimpleNamespace:
-    """The same of float64 trees."""
-    return fast_triangles(lanes, form, kept, "float64")

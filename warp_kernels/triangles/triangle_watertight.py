@@ -1,24 +1,30 @@
-"""Woop, Benthin and Wald 2013 on a block's triangles, operation by operation as triangle_watertight.h."""
+"""The watertight test: Woop, Benthin and Wald 2013.
+
+Operation by operation as cpu/traverse/triangle_watertight.h.
+"""
 
 from types import SimpleNamespace
 
-# mypy: ignore-errors
-# Warp compiles these functions: to mypy they are no Python.
 import warp as wp
 
 from wive.warp_kernels.lanes.lanes import load_float, lowest_lane, product, product_double, without_gradient
+from wive.warp_kernels.lanes.precision import stack_numbers
 from wive.warp_kernels.queries.frame import RayFrame, axes_of, component
 from wive.warp_kernels.triangles.sheared import edges_in_lanes
 
-# What the test keeps of a ray, in words: the axis behind each sheared axis, the origin, the direction (both
-# sheared axis by axis) and the shear. It is needed in leaves only, so it waits in memory behind the stack's
-# entries and holds no registers meanwhile.
-KEPT_WORDS = 11
+# What the test keeps of a ray, in words: the mesh axis of each sheared axis, then floats by sheared axis:
+# origin, direction (three each) and shear (two). Only leaves need it, so it is kept in the stack's memory
+# rather than in registers.
+AXES = 0
+ORIGIN = 3
+DIRECTION = 6
+SHEAR = 9
+RAY_WORDS = 11
 
 
 @wp.func
 def flip(x: wp.float64, negative: bool):
-    """x, negated where `negative`; never -0."""
+    """x, negated if `negative`; never -0."""
     return wp.where(negative, -x, x) + wp.float64(0.0)
 
 
@@ -36,35 +42,39 @@ def edges_of(a: wp.vec3d, b: wp.vec3d, c: wp.vec3d):
     )
 
 
-def watertight_triangles(lanes: SimpleNamespace, form: SimpleNamespace, kept: int) -> SimpleNamespace:
-    """The test for these lanes and blocks, its ray kept from word `kept` of the stack."""
+def watertight_triangles(
+    lanes: SimpleNamespace, blocks: SimpleNamespace, ray_base: int, precision: str
+) -> SimpleNamespace:
+    """The test for a lane form and block form; its ray is kept from stack word `ray_base` on."""
     length: int = lanes.triangles_length
-    used, stride_of, vertex_at = form.used, form.stride, form.vertex_at
+    used, stride_of, vertex_at = blocks.used, blocks.stride, blocks.vertex_at
     store_word, load_word, stack_argument = lanes.store_word, lanes.load_word, lanes.stack_argument
+    numbers = stack_numbers(lanes, precision, ray_base)
+    store, load = numbers.store, numbers.load
 
     @without_gradient
     @wp.func
     def axis_of(stack: stack_argument, axis: int):
-        """The axis of the mesh that is this sheared axis."""
-        return int(load_word(stack, kept + axis))
+        """The mesh axis of a sheared axis."""
+        return int(load_word(stack, ray_base + AXES + axis))
 
     @without_gradient
     @wp.func
-    def kept_origin(stack: stack_argument, axis: int):
+    def origin_of(stack: stack_argument, axis: int):
         """The ray's origin on a sheared axis."""
-        return wp.cast(load_word(stack, kept + 3 + axis), wp.float32)
+        return load(stack, ORIGIN + axis)
 
     @without_gradient
     @wp.func
-    def kept_direction(stack: stack_argument, axis: int):
+    def direction_of(stack: stack_argument, axis: int):
         """The ray's direction on a sheared axis, the longest last."""
-        return wp.cast(load_word(stack, kept + 6 + axis), wp.float32)
+        return load(stack, DIRECTION + axis)
 
     @without_gradient
     @wp.func
-    def kept_shear(stack: stack_argument, axis: int):
+    def shear_of(stack: stack_argument, axis: int):
         """The direction on a sheared axis over that on the longest."""
-        return wp.cast(load_word(stack, kept + 9 + axis), wp.float32)
+        return load(stack, SHEAR + axis)
 
     @without_gradient
     @wp.func
@@ -73,39 +83,39 @@ def watertight_triangles(lanes: SimpleNamespace, form: SimpleNamespace, kept: in
         axes = axes_of(ray.longest_axis)
         forward = component(ray.direction, axes[2])
         for i in range(3):
-            store_word(stack, kept + i, wp.uint32(axes[i]))
-            store_word(stack, kept + 3 + i, wp.cast(component(ray.origin, axes[i]), wp.uint32))
-            store_word(stack, kept + 6 + i, wp.cast(component(ray.direction, axes[i]), wp.uint32))
+            store_word(stack, ray_base + AXES + i, wp.uint32(axes[i]))
+            store(stack, ORIGIN + i, component(ray.origin, axes[i]))
+            store(stack, DIRECTION + i, component(ray.direction, axes[i]))
         for i in range(2):
-            store_word(stack, kept + 9 + i, wp.cast(component(ray.direction, axes[i]) / forward, wp.uint32))
+            store(stack, SHEAR + i, component(ray.direction, axes[i]) / forward)
 
     @without_gradient
     @wp.func
     def rounded(units: wp.uint64, at: int, stride: int, stack: stack_argument):
-        """A vertex in the sheared space, in float as the edge functions of all triangles round it."""
-        z = load_float(units, at + stride * axis_of(stack, 2)) - kept_origin(stack, 2)
-        x = (load_float(units, at + stride * axis_of(stack, 0)) - kept_origin(stack, 0)) - product(
-            kept_shear(stack, 0), z
+        """A vertex in the sheared space, rounded to float alike for every triangle that has it."""
+        z = load_float(units, at + stride * axis_of(stack, 2)) - origin_of(stack, 2)
+        x = (load_float(units, at + stride * axis_of(stack, 0)) - origin_of(stack, 0)) - product(
+            shear_of(stack, 0), z
         )
-        y = (load_float(units, at + stride * axis_of(stack, 1)) - kept_origin(stack, 1)) - product(
-            kept_shear(stack, 1), z
+        y = (load_float(units, at + stride * axis_of(stack, 1)) - origin_of(stack, 1)) - product(
+            shear_of(stack, 1), z
         )
         return wp.vec3d(wp.float64(x), wp.float64(y), wp.float64(z))
 
     @without_gradient
     @wp.func
     def away(units: wp.uint64, at: int, stride: int, stack: stack_argument, axis: int):
-        """From the ray's origin to a vertex on a sheared axis, exactly or rounded once in double."""
+        """The way from the ray's origin to a vertex on a sheared axis, exact or rounded once in double."""
         return wp.float64(load_float(units, at + stride * axis_of(stack, axis))) - wp.float64(
-            kept_origin(stack, axis)
+            origin_of(stack, axis)
         )
 
     @without_gradient
     @wp.func
     def across(units: wp.uint64, at: int, stride: int, stack: stack_argument, axis: int):
-        """A vertex on the plane across the ray, scaled by the direction's longest component."""
-        forward = wp.float64(kept_direction(stack, 2))
-        slope = wp.float64(kept_direction(stack, axis))
+        """A vertex in the plane across the ray, scaled by the direction's longest component."""
+        forward = wp.float64(direction_of(stack, 2))
+        slope = wp.float64(direction_of(stack, axis))
         return product_double(away(units, at, stride, stack, axis), forward) - product_double(
             slope, away(units, at, stride, stack, 2)
         )
@@ -113,7 +123,7 @@ def watertight_triangles(lanes: SimpleNamespace, form: SimpleNamespace, kept: in
     @without_gradient
     @wp.func(inline=False)
     def solve(units: wp.uint64, block: int, j: int, stack: stack_argument, negative: bool):
-        """t, u and v in double, rounded once; of the rounded triangle where only rounding let the ray in."""
+        """t, u and v in double, rounded once; those of the rounded triangle if only it is hit."""
         stride = stride_of(units, block)
         at_a = vertex_at(units, block, 0, j)
         at_b = vertex_at(units, block, 1, j)
@@ -135,13 +145,13 @@ def watertight_triangles(lanes: SimpleNamespace, form: SimpleNamespace, kept: in
         zb = away(units, at_b, stride, stack, 2)
         zc = away(units, at_c, stride, stack, 2)
         height = product_double(wa, za) + product_double(wb, zb) + product_double(wc, zc)
-        t = wp.float32(height / (det * wp.float64(kept_direction(stack, 2))))
+        t = wp.float32(height / (det * wp.float64(direction_of(stack, 2))))
         return wp.vec3(t, wp.float32(wb * inverse), wp.float32(wc * inverse))
 
     @without_gradient
     @wp.func(inline=False)
     def solve_rounded(units: wp.uint64, block: int, j: int, stack: stack_argument):
-        """The same for the triangle with rounded corners."""
+        """t, u and v of the triangle with rounded corners."""
         stride = stride_of(units, block)
         at_a = vertex_at(units, block, 0, j)
         at_b = vertex_at(units, block, 1, j)
@@ -152,13 +162,13 @@ def watertight_triangles(lanes: SimpleNamespace, form: SimpleNamespace, kept: in
         w = edges_of(a, b, c)
         det = w[0] + w[1] + w[2]
         height = product_double(w[0], a[2]) + product_double(w[1], b[2]) + product_double(w[2], c[2])
-        t = wp.float32(height / (det * wp.float64(kept_direction(stack, 2))))
+        t = wp.float32(height / (det * wp.float64(direction_of(stack, 2))))
         return wp.vec3(t, wp.float32(w[1] / det), wp.float32(w[2] / det))
 
     @without_gradient
     @wp.func(inline=False)
     def side_of(units: wp.uint64, block: int, j: int, stack: stack_argument):
-        """The side on which the ray passes the edges, 1 or -1, decided exactly; 0 where it misses."""
+        """The side on which the ray passes the edges, 1 or -1, decided exactly; 0 if it misses."""
         stride = stride_of(units, block)
         at_a = vertex_at(units, block, 0, j)
         at_b = vertex_at(units, block, 1, j)
@@ -172,37 +182,37 @@ def watertight_triangles(lanes: SimpleNamespace, form: SimpleNamespace, kept: in
         positive = wp.where(w[0] > zero or w[1] > zero or w[2] > zero, 1, 0)
         return positive - negative
 
-    edges = edges_in_lanes(lanes, form, axis_of, kept_origin, kept_shear)
+    edges = edges_in_lanes(lanes, blocks, axis_of, origin_of, shear_of)
 
     @without_gradient
     @wp.func
     def candidates(units: wp.uint64, block: int, lane: int, stack: stack_argument):
-        """The lanes whose triangle the ray's line meets, one bit each, and those passed clockwise."""
+        """The lanes whose triangle the ray's line hits, one bit each, and those that it passes clockwise."""
         u, v, w = edges(units, block, lane, stack)
         low = wp.min(wp.min(u, v), w)
         high = wp.max(wp.max(u, v), w)
-        lanes = wp.uint32(0)
+        hit_mask = wp.uint32(0)
         for i in range(length):
             if low[i] >= 0.0 or high[i] <= 0.0:
-                lanes = lanes | wp.uint32(1 << i)
-        lanes = used(units, block, lane, lanes)
+                hit_mask = hit_mask | wp.uint32(1 << i)
+        hit_mask = used(units, block, lane, hit_mask)
         negative = wp.uint32(0)
-        if lanes != wp.uint32(0):
+        if hit_mask != wp.uint32(0):
             ties = wp.uint32(0)
             for i in range(length):
                 if low[i] < 0.0:
                     negative = negative | wp.uint32(1 << i)
                 if u[i] == 0.0 or v[i] == 0.0 or w[i] == 0.0:
                     ties = ties | wp.uint32(1 << i)
-            # Where a product hid a sign, the products are taken again in double, where they are exact.
-            ties = ties & lanes
+            # An edge function of zero may hide a sign; it is computed again in double, which holds products.
+            ties = ties & hit_mask
             while ties != wp.uint32(0):
                 i = lowest_lane(ties)
                 bit = wp.uint32(1) << wp.uint32(i)
                 ties = ties ^ bit
                 side = side_of(units, block, wp.where(length == 1, lane & 3, i), stack)
-                lanes = lanes & ~wp.where(side == 0, bit, wp.uint32(0))
+                hit_mask = hit_mask & ~wp.where(side == 0, bit, wp.uint32(0))
                 negative = (negative & ~bit) | wp.where(side < 0, bit, wp.uint32(0))
-        return wp.vec2ui(lanes, negative)
+        return wp.vec2ui(hit_mask, negative)
 
     return SimpleNamespace(prepare=prepare, candidates=candidates, solve=solve)

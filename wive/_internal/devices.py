@@ -70,10 +70,10 @@ def _start_warp() -> ModuleType:
     """Warp, started without messages about itself; `warp_devices` reports a missing driver."""
     import tempfile
 
-    from wive.warp_kernels.tree.quiet import hush
+    from wive.warp_kernels.tree.quiet import set_quiet
 
     wp = importlib.import_module("warp")
-    hush()
+    set_quiet()
     with tempfile.TemporaryFile() as messages, _stderr_to(messages.fileno()):
         wp.init()
         messages.seek(0)

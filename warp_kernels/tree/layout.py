@@ -1,0 +1,50 @@
+"""The tree in memory, as cpu/core/layout.h and compressed.h describe it, counted in words of 32 bits.
+
+A child reference, masked by WORD_MASK, is the word at which the child begins: the reference holds the child's
+unit times eight, and a unit is eight words.
+"""
+
+import warp as wp
+
+UNIT_WORDS = 8
+WORD_MASK = 0x7FFFFFF8
+MAX_DEPTH = 64
+
+# A node: six rows of planes, the children, the ranks. `upload` turns the core's order row into ranks: lane i
+# holds its own place in each octant's order.
+NODE_WIDTH = 8
+NODE_WORDS = 8 * NODE_WIDTH
+CHILD_ROW = 6 * NODE_WIDTH
+RANK_ROW = 7 * NODE_WIDTH
+RANK_BITS = 4  # per octant
+
+# A compressed node: origin and step (three floats each), six rows of eight bytes, eight ranks of three bytes,
+# the children.
+COMPRESSED_NODE_WORDS = 32
+COMPRESSED_STEP = 3
+COMPRESSED_PLANES = 6
+COMPRESSED_RANKS = 18
+COMPRESSED_CHILD_ROW = 24
+COMPRESSED_RANK_BITS = 3
+
+# A block: nine rows of four numbers, row 3 k + axis for vertex k, and the prims; in float64 each number takes
+# two words, and the block is padded to a multiple of 32 bytes.
+BLOCK_WIDTH = 4
+BLOCK_WORDS = 40
+PRIM_ROW = 9 * BLOCK_WIDTH
+MAX_LEAF_BLOCKS = 8
+
+# A compressed block: two words of header, rows x, y, z of its six or eight vertices, and the prims. The
+# header's words hold the corners' vertex numbers, 16 bits per corner, 4 bits per lane; above the third
+# corner's are a bit per lane in use and the number of vertices.
+LEAST_COMPRESSED_WORDS = 24
+HEADER_WORDS = 2
+CORNER_BITS = 16
+NUMBER_BITS = 4
+USED_SHIFT = 16
+VERTICES_SHIFT = 20
+
+END_OF_STACK = -1  # all bits set: a leaf by its sign
+NO_PRIM = -1
+ALL_BITS = wp.constant(wp.uint32(0xFFFFFFFF))
+SIGN_BIT = wp.constant(wp.uint32(0x80000000))
