@@ -128,6 +128,20 @@ def test_tree_too_deep_for_the_functions_is_an_error_and_misses() -> None:
         warp_kernels.check(tree)
 
 
+def test_functions_are_made_when_first_used() -> None:
+    code = """
+import sys
+from wive import warp_kernels
+assert "wive.warp_kernels.functions.functions" not in sys.modules
+assert {"closest_hit", "differentiable_hit"} <= set(dir(warp_kernels))
+assert warp_kernels.closest_hit is warp_kernels.closest_hit
+assert "wive.warp_kernels.functions.functions" in sys.modules
+"""
+    subprocess.run([sys.executable, "-c", code], check=True, timeout=60)
+    with pytest.raises(AttributeError, match="no attribute 'farthest_hit'"):
+        _ = warp_kernels.farthest_hit
+
+
 def test_example_prints_a_tower_and_the_sky_it_hides() -> None:
     example = Path(__file__).resolve().parents[2] / "examples" / "ambient_occlusion.py"
     run = subprocess.run([sys.executable, str(example)], capture_output=True, text=True, timeout=100)
