@@ -347,7 +347,8 @@ def _tracer(bvh: _cpu.Bvh, faces: NDArray[np.int32], backend: str, device: str |
         return CpuTracer(bvh, faces, backend)
     from wive.warp_kernels.scene.tracer import WarpTracer
 
-    return WarpTracer(bvh, faces, device)
+    tracer: Tracer = WarpTracer(bvh, faces, device)
+    return tracer
 
 
 def load(path: PathLike, *, backend: str | None = None, device: str | None = None) -> Scene:

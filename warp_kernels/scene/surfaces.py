@@ -19,7 +19,7 @@ def in_double(v: wp.vec3) -> wp.vec3d:
 
 
 @wp.func
-def in_double(v: wp.vec3d) -> wp.vec3d:  # noqa: D103, F811
+def in_double(v: wp.vec3d) -> wp.vec3d:
     return v
 
 

@@ -127,7 +127,8 @@ class WarpTracer:
         """A function that renders rows [begin, end) into `image` and returns how many rays it traced."""
         from wive.warp_kernels.scene.render import PictureRenderer
 
-        return PictureRenderer(self, camera, image, settings).render_rows
+        renderer: Callable[[int, int], int] = PictureRenderer(self, camera, image, settings).render_rows
+        return renderer
 
     def _count(self, rays: WarpRays, work: Work) -> tuple[Any, Any]:
         counts = wp.empty(len(rays), dtype=wp.int32, device=self.device)
