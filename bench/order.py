@@ -15,13 +15,14 @@ save one load per node. `distance` has its own kernel, which sorts eight keys by
 
 import argparse
 from collections.abc import Iterator, Sequence
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from bench.contenders import order_study
 from bench.contenders.compiled_shim import BenchError
 from bench.contenders.embree_race import TUNED
+from bench.contenders.order_study import SORTING, STORED_ORDERS, Order
 from bench.figures.order_figure import draw
 from bench.support import report
 from bench.support.options import listed, scene_parser
@@ -30,13 +31,9 @@ from bench.support.scenes import Mesh, SceneFolder
 from bench.support.timing import QUICK, Effort, compare_in_turn, geometric_mean, one_core, timed
 from wive import _cpu
 
-Order = Literal["treelet", "diagonal", "slots", "none"]
-STORED_ORDERS: tuple[Order, ...] = ("treelet", "diagonal", "slots", "none")
 DISTANCE = "distance"
 COUNTING_KERNEL = "scalar"
 DISTANCE_KERNEL = "scalar.distance"
-# Kernel of the stored orders and that of true distance, the best pair that runs here.
-TIMED_KERNELS = (("avx512.full", "avx512.distance"), (COUNTING_KERNEL, DISTANCE_KERNEL))
 TIMED_RAYS = 131_072
 IN_FLIGHT = (1, TUNED)
 KINDS = ("primary", "diffuse")
@@ -60,7 +57,7 @@ def main(options: Sequence[str]) -> None:
     speed: list[report.Row] = []
     for name in scenes.names:
         mesh = folder.load(name)
-        trees = {order: _cpu.Bvh(mesh.vertices, mesh.faces, "fast", order) for order in STORED_ORDERS}
+        trees = {order: order_study.tree(mesh.vertices, mesh.faces, "fast", order) for order in STORED_ORDERS}
         check_same_tree(list(trees.values()), mesh.name)
         recorded = recorded_rays(mesh)
         sets = [
@@ -106,14 +103,16 @@ def scene_rows(mesh: Mesh, trees: Trees, sets: Sequence[Rays]) -> Iterator[repor
 def speed_rows(mesh: Mesh, trees: Trees, sets: Sequence[Rays], effort: Effort) -> Iterator[report.Row]:
     """Speed: one row per set of rays, number in flight and order."""
     unusable = _cpu.kernels()
-    stored, sorting = next(pair for pair in TIMED_KERNELS if not any(unusable[kernel] for kernel in pair))
+    sorting, stored = next(
+        pair for pair in SORTING.items() if not unusable[pair[1]]
+    )  # the best pair that runs
     walks: dict[str, tuple[_cpu.Bvh, str]] = {order: (tree, stored) for order, tree in trees.items()}
     walks[DISTANCE] = (trees["treelet"], sorting)
     for rays in (rays.thinned(TIMED_RAYS) for rays in sets):
         for in_flight in IN_FLIGHT:
 
             def trace(walk: tuple[_cpu.Bvh, str], rays: Rays = rays, in_flight: int = in_flight) -> None:
-                walk[0].intersect(walk[1], *rays.arrays, threads=1, in_flight=in_flight)
+                closest(*walk, rays, in_flight=in_flight)
 
             runs = [timed(lambda walk=walk: trace(walk)) for walk in walks.values()]  # type: ignore[misc]
             with one_core():
@@ -137,9 +136,18 @@ def speed_rows(mesh: Mesh, trees: Trees, sets: Sequence[Rays], effort: Effort) -
                 }
 
 
+def closest(
+    tree: _cpu.Bvh, kernel: str, rays: Rays, in_flight: int = 0, stats: bool = False
+) -> tuple[NDArray[np.float32], NDArray[np.int32], NDArray[np.float32], NDArray[np.int32] | None]:
+    """t, prim, uv and, if asked for, steps, on one thread."""
+    if kernel in SORTING:
+        return order_study.intersect(kernel, tree, *rays.arrays, in_flight=in_flight, stats=stats)
+    return tree.intersect(kernel, *rays.arrays, threads=1, in_flight=in_flight, stats=stats)
+
+
 def _trace(tree: _cpu.Bvh, kernel: str, rays: Rays) -> tuple[NDArray[np.float32], dict[str, float]]:
     """Each ray's t, and the counters' means."""
-    t, _, _, stats = tree.intersect(kernel, *rays.arrays, stats=True)
+    t, _, _, stats = closest(tree, kernel, rays, stats=True)
     assert stats is not None
     means = stats.mean(axis=0, dtype=np.float64).tolist()
     return t, dict(zip(COUNTERS, means, strict=True))

@@ -18,8 +18,7 @@ exact_source: str  # C++ text of the exact arithmetic, which the Warp kernels co
 def kernels() -> dict[str, str]:
     """Every traversal kernel compiled in, best first, and why this machine can't run it ("" if it can).
 
-    Names: "avx512" (the better of the two forms below), "avx512.full", "avx512.half", "avx2", "scalar"; and,
-    sorting children by distance for comparisons, "avx512.distance" and "scalar.distance".
+    Names: "avx512" (the better of the two forms below), "avx512.full", "avx512.half", "avx2", "scalar".
     """
 
 def avx512_form() -> Literal["full", "half"]:
@@ -45,7 +44,6 @@ class Bvh:
         vertices: NDArray[Real],
         faces: NDArray[np.int32],
         accuracy: Literal["fast", "watertight", "exact"] = "watertight",
-        order: Literal["treelet", "diagonal", "slots", "none"] = "treelet",
         threads: int = 0,
         depth_limit: int = 64,
         nodes: Literal["float32", "compressed"] = "float32",

@@ -7,6 +7,7 @@ import os
 import shlex
 import shutil
 import subprocess
+from collections.abc import Sequence
 from pathlib import Path
 
 EMBREE_SHIM = Path(__file__).parents[1] / "native" / "embree_shim.cpp"
@@ -58,19 +59,24 @@ def compiler_version() -> str:
     return (answer.stdout.splitlines() or ["unknown"])[0]
 
 
-def compiled(source: Path) -> Path:
-    """Path of the source as a shared library, built now if it and the compiler have not met before."""
-    key = "\n".join([source.read_text(), compiler_version(), *compiler(), *FLAGS])
-    target = cache_folder() / f"{source.stem}-{hashlib.sha256(key.encode()).hexdigest()[:16]}.so"
+def compiled(*sources: Path, flags: Sequence[str] = FLAGS, headers: Sequence[Path] = ()) -> Path:
+    """Path of the sources as one shared library, built if it does not exist yet for this text and compiler.
+
+    headers: folders with the headers that the sources include, which are part of the text.
+    """
+    included = sorted(header for folder in headers for header in folder.rglob("*.h"))
+    texts = [path.read_text() for path in (*sources, *included)]
+    key = "\n".join([*texts, compiler_version(), *compiler(), *flags])
+    target = cache_folder() / f"{sources[0].stem}-{hashlib.sha256(key.encode()).hexdigest()[:16]}.so"
     if not target.exists():
         draft = target.with_suffix(f".{os.getpid()}.tmp")
-        command = [*compiler(), *FLAGS, str(source), "-o", str(draft), "-ldl"]
+        command = [*compiler(), *flags, *map(str, sources), "-o", str(draft), "-ldl"]
         answer = subprocess.run(command, capture_output=True, text=True, check=False)
         if answer.returncode:
             reason = next(
                 (line for line in answer.stderr.splitlines() if "error" in line), answer.stderr.strip()
             )
-            raise BenchError(f"{source.name} does not compile: {reason}")
+            raise BenchError(f"{sources[0].name} does not compile: {reason}")
         draft.replace(target)
     return target
 

@@ -7,7 +7,6 @@
 #include <span>
 
 #include "build/mesh.h"
-#include "build/order.h"
 #include "core/box.h"
 #include "core/compressed.h"
 #include "core/large_array.h"
@@ -21,7 +20,6 @@ enum class Quality { medium, high };
 struct BuildOptions {
     Accuracy accuracy = Accuracy::watertight;
     NodeForm nodes = NodeForm::float32;
-    ChildOrder order = ChildOrder::treelet;
     unsigned threads = 0;  // 0: one per core
     int depth_limit = max_depth;
     Quality quality = Quality::medium;

@@ -203,12 +203,8 @@ private:
                       center_);
             node.child[i] = children[static_cast<std::size_t>(i)];
         }
-        const SlotSequences order = options_.order == ChildOrder::treelet    ? treelet.order
-                                    : options_.order == ChildOrder::diagonal ? sort_along_diagonals(node, treelet.count)
-                                    : options_.order == ChildOrder::slots    ? assign_places(node, treelet.count)
-                                                                             : shuffle(node, treelet.count);
-        assert(is_permutation(order, treelet.count));
-        write_order(node, order, treelet.count);
+        assert(is_permutation(treelet.order, treelet.count));
+        write_order(node, treelet.order, treelet.count);
         Writer::write_node(node, treelet.count, out);
     }
 

@@ -17,7 +17,7 @@ namespace {
 constexpr std::string_view full = "full", half = "half", race = "race";
 
 #if defined(__x86_64__)
-// Machines on which both forms have been measured at length.
+// Processor families on which both forms have been measured at length.
 struct Measured {
     std::string_view vendor;
     unsigned family;
@@ -27,7 +27,7 @@ constexpr Measured measured[] = {
     {"AuthenticAMD", 0x19, full},  // Zen 4, the only one of this family with AVX-512: its units are 256 bits wide
 };
 
-// What is to be done on this machine: one of the forms where it is known to be the better one, or the race.
+// The form known to be faster on this machine, or `race`.
 std::string_view known_form() {
     unsigned highest = 0, signature = 0, name[3] = {}, unused = 0;
     if (__get_cpuid(0, &highest, &name[0], &name[2], &name[1]) != 0 &&
@@ -66,7 +66,7 @@ std::string_view avx512_form() {
 
 const KernelTable<float>* avx512_kernels() {
     static const auto table =
-        join("avx512", {avx512_form() == half ? avx512_half_kernels() : nullptr, avx512_full_kernels()});
+        join<float>("avx512", {avx512_form() == half ? avx512_half_kernels() : nullptr, avx512_full_kernels()});
     return table ? &*table : nullptr;
 }
 

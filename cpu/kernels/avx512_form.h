@@ -7,11 +7,11 @@
 
 namespace wive {
 
-// "full" or "half": the better one here, decided by the first call. Only for machines that run AVX-512. Throws
-// std::invalid_argument where the environment variable WIVE_AVX512_FORM is set to something unknown.
+// "full" or "half": the faster one here, decided by the first call. Only for machines that run AVX-512. Throws
+// std::invalid_argument if the environment variable WIVE_AVX512_FORM has an unknown value.
 std::string_view avx512_form();
 
-// The kernels of that form; of full where half has none (compressed nodes, stats). Null where none is compiled in.
+// The kernels of that form; those of full for what half lacks (compressed nodes, stats). Null if none is compiled in.
 const KernelTable<float>* avx512_kernels();
 
 }  // namespace wive

@@ -12,7 +12,7 @@ namespace wive {
 namespace {
 
 #if defined(__x86_64__)
-bool has_lzcnt() {  // no name for __builtin_cpu_supports in every compiler; without it lzcnt would run as bsr
+bool has_lzcnt() {  // not every compiler's __builtin_cpu_supports knows it; a CPU without it would run lzcnt as bsr
     unsigned a = 0, b = 0, c = 0, d = 0;
     return __get_cpuid(0x80000001u, &a, &b, &c, &d) != 0 && (c >> 5 & 1u) != 0;
 }
@@ -31,14 +31,13 @@ bool has_avx512() { return false; }
 
 struct Entry {
     std::string_view name;
-    const KernelTable<float>* (*kernels)();  // "avx512" is a choice of two, made by the first query that needs it
-    const KernelTable<double>* (
-        *float64_kernels)();  // null where the name is for comparisons of float32 traversals only
+    const KernelTable<float>* (*kernels)();           // for "avx512" the first call chooses one of two forms
+    const KernelTable<double>* (*float64_kernels)();  // null for a traversal of float32 scenes only
     bool compiled, runs;
     std::string_view needs;
 };
 
-// Asked once: every query looks its kernels up, and on a virtual machine one CPUID instruction takes microseconds.
+// Filled once: on a virtual machine one CPUID instruction takes microseconds.
 const std::vector<Entry>& entries() {
     constexpr std::string_view avx512 = "AVX-512 F, VL, DQ or BW", avx2 = "AVX2, FMA, BMI1, BMI2, LZCNT or POPCNT";
     static const bool x86_64 = avx512_half_kernels() != nullptr;
@@ -46,10 +45,8 @@ const std::vector<Entry>& entries() {
         {"avx512", avx512_kernels, avx512_float64_kernels, x86_64, has_avx512(), avx512},
         {"avx512.full", avx512_full_kernels, avx512_float64_kernels, x86_64, has_avx512(), avx512},
         {"avx512.half", avx512_half_kernels, nullptr, x86_64, has_avx512(), avx512},
-        {"avx512.distance", avx512_by_distance_kernels, nullptr, x86_64, has_avx512(), avx512},
         {"avx2", avx2_kernels, avx2_float64_kernels, x86_64, has_avx2(), avx2},
         {"scalar", scalar_kernels, scalar_float64_kernels, true, true, ""},
-        {"scalar.distance", scalar_by_distance_kernels, nullptr, true, true, ""},
     };
     return all;
 }

@@ -13,14 +13,14 @@
 namespace wive {
 namespace {
 
-// A megabyte of tree: more than the first cache holds, and built in milliseconds.
-constexpr std::uint32_t sheets = 4, cells = 50;  // triangles: two a cell
+// A tree of a megabyte: larger than the first-level cache, built in milliseconds.
+constexpr std::uint32_t sheets = 4, cells = 50;  // two triangles per cell
 constexpr std::size_t ray_count = 1024;
 constexpr int turns = 3, passes = 3;
-// Forms closer than this are as good as each other: then every run of a program should use the same.
+// Times closer than this are a tie, in which the holder stays, so that every run of a program uses the same form.
 constexpr double clear_lead = 0.98;
 
-// Rough sheets of ground above each other, within the unit cube, and rays between them in all directions.
+// Rough horizontal sheets in the unit cube, and rays from random points in all directions.
 class Course {
 public:
     Course() {
@@ -75,8 +75,8 @@ bool is_faster(const KernelTable<float>& challenger, const KernelTable<float>& h
     hits.prim = prim.data();
 
     const std::array tables = {&challenger, &holder};
-    // One ray at a time, and as many in flight as batches have: a table holds one kernel for both, and both are
-    // how it is used, so that which is faster is asked of the product of their times.
+    // One ray at a time, and as many in flight as batches have: users do both with one table, so the product of the two
+    // times decides.
     const std::array in_flight = {1u, 0u};
     double best[2][2];
     for (auto& of_table : best)
@@ -85,8 +85,8 @@ bool is_faster(const KernelTable<float>& challenger, const KernelTable<float>& h
         for (std::size_t table = 0; table < 2; ++table) {
             const TraceBatch<float> kernel = tables[table]->find(choice);
             for (std::size_t way = 0; way < 2; ++way)
-                // Several passes a turn: some processors lower their clock for 512-bit arithmetic, and need the better
-                // part of a millisecond to raise it after the other table's turn.
+                // Several passes per turn: some processors lower their clock for 512-bit arithmetic and need up to a
+                // millisecond to raise it after the other table's turn.
                 for (int pass = 0; pass < passes; ++pass) {
                     const auto begin = std::chrono::steady_clock::now();
                     trace(*tables[table], kernel, bvh.view(), course.rays(), hits, ray_count, 1, in_flight[way]);

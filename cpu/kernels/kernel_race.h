@@ -5,7 +5,7 @@
 
 namespace wive {
 
-// Races the tables on a built-in scene, for some 20 ms: whether `challenger` is clearly ahead, not within the noise.
+// Whether `challenger` is faster than `holder` by more than the noise, measured on a built-in scene in some 20 ms.
 // Both must have the kernels of closest hits in watertight float32 trees.
 bool is_faster(const KernelTable<float>& challenger, const KernelTable<float>& holder);
 

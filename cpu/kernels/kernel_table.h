@@ -1,4 +1,6 @@
-// Instantiates a table of kernels; included once in each instruction set's own translation unit.
+// Instantiates a table of kernels. Included in units of one instruction set each, which CMakeLists.txt names in
+// WIVE_ISA: the namespace of all that such a unit instantiates, so that the linker never takes one instruction set's
+// code for another's.
 #pragma once
 
 #include <algorithm>
@@ -13,27 +15,23 @@
 #include "traverse/triangle_fast.h"
 #include "traverse/triangle_watertight.h"
 
-namespace wive {
+namespace wive::WIVE_ISA {
 
-// The slab test of nodes that a table has no kernels for.
+// In place of a slab test: the table has no kernels for that node form.
 template <class>
 struct NoSlabs;
 
-// What a table, or the part of it that one translation unit makes, is made for.
-using MadeFor = bool (*)(KernelChoice);
-constexpr bool everything(KernelChoice) { return true; }
-constexpr bool first_hits(KernelChoice choice) {
+// Which kernels a table, or the part of it that one translation unit makes, holds.
+using KernelFilter = bool (*)(KernelChoice);
+constexpr bool every_kernel(KernelChoice) { return true; }
+constexpr bool is_first_hit(KernelChoice choice) {
     return choice.query == QueryKind::closest || choice.query == QueryKind::any;
 }
-constexpr bool all_hits(KernelChoice choice) { return !first_hits(choice); }
-// The half form: its steps are those of the full form, which counts them.
-constexpr bool all_but_counting(KernelChoice choice) { return !choice.counting; }
-// By distance: what `python -m bench order` and the tests compare.
-constexpr bool closest_inexact(KernelChoice choice) {
-    return choice.query == QueryKind::closest && choice.accuracy != Accuracy::exact;
-}
+constexpr bool is_multi_hit(KernelChoice choice) { return !is_first_hit(choice); }
+// The half form takes the steps of the full form, which counts them.
+constexpr bool is_without_counters(KernelChoice choice) { return !choice.counting; }
 
-template <class Isa, template <class> class ForFloat32, template <class> class ForCompressed, MadeFor made_for>
+template <class Isa, template <class> class ForFloat32, template <class> class ForCompressed, KernelFilter filter>
 struct KernelMaker {
     using Real = typename Isa::Real;
 
@@ -58,7 +56,7 @@ struct KernelMaker {
         using Asked = Query<choice.query>;
         constexpr bool exact_of_doubles =
             choice.accuracy == Accuracy::exact && precision_of<Real> == Precision::float64;
-        if constexpr (!made_for(choice) || exact_of_doubles || std::is_same_v<Slabs<Isa>, NoSlabs<Isa>>)
+        if constexpr (!filter(choice) || exact_of_doubles || std::is_same_v<Slabs<Isa>, NoSlabs<Isa>>)
             return NoKernel{};
         else if constexpr (choice.accuracy == Accuracy::fast)
             return Kernel<Slabs, FastTriangles, Asked, choice.counting>{};
@@ -80,16 +78,17 @@ struct KernelMaker {
     }
 
     template <std::size_t... index>
-    static constexpr KernelTable<Real> table(std::string_view name, std::index_sequence<index...>) {
-        return {name,
+    static constexpr KernelTable<Real> table(std::index_sequence<index...>) {
+        return {"",
                 std::max({decltype(kernel<kernel_choice(index)>())::flight_bytes...}),
                 {decltype(kernel<kernel_choice(index)>())::trace...}};
     }
 };
 
-template <class Isa, template <class> class ForFloat32, template <class> class ForCompressed, MadeFor made_for>
-constexpr KernelTable<typename Isa::Real> make_kernel_table(std::string_view name) {
-    return KernelMaker<Isa, ForFloat32, ForCompressed, made_for>::table(name, std::make_index_sequence<kernel_count>());
+// A table without a name: `join` names it.
+template <class Isa, template <class> class ForFloat32, template <class> class ForCompressed, KernelFilter filter>
+constexpr KernelTable<typename Isa::Real> make_kernel_table() {
+    return KernelMaker<Isa, ForFloat32, ForCompressed, filter>::table(std::make_index_sequence<kernel_count>());
 }
 
-}  // namespace wive
+}  // namespace wive::WIVE_ISA

@@ -4,6 +4,8 @@
 #include <stdexcept>
 #include <string>
 
+#include "kernels/parts.h"
+
 namespace wive {
 namespace {
 
@@ -30,31 +32,56 @@ TraceBatch<Real> KernelTable<Real>::find(KernelChoice choice) const {
 template struct KernelTable<float>;
 template struct KernelTable<double>;
 
-std::optional<KernelTable<float>> join(std::string_view name, std::initializer_list<const KernelTable<float>*> parts) {
-    KernelTable<float> table = {name, 0, {}};
-    for (const KernelTable<float>* part : parts) {
+template <class Real>
+std::optional<KernelTable<Real>> join(std::string_view name, std::initializer_list<const KernelTable<Real>*> parts) {
+    KernelTable<Real> table = {name, 0, {}};
+    for (const KernelTable<Real>* part : parts) {
         if (part == nullptr) continue;
         table.flight_bytes = std::max(table.flight_bytes, part->flight_bytes);
         std::transform(table.kernels.begin(), table.kernels.end(), part->kernels.begin(), table.kernels.begin(),
-                       [](TraceBatch<float> had, TraceBatch<float> more) { return had != nullptr ? had : more; });
+                       [](TraceBatch<Real> had, TraceBatch<Real> more) { return had != nullptr ? had : more; });
     }
     if (table.flight_bytes == 0) return std::nullopt;
     return table;
 }
 
+template std::optional<KernelTable<float>> join(std::string_view, std::initializer_list<const KernelTable<float>*>);
+template std::optional<KernelTable<double>> join(std::string_view, std::initializer_list<const KernelTable<double>*>);
+
+namespace {
+
+#if defined(WIVE_X86_64)
+constexpr bool is_x86_64 = true;
+#else
+constexpr bool is_x86_64 = false;
+#endif
+
+// The parts of one instruction set under one name; null if this build is for another architecture.
+template <class Real, IsaName isa, Part... parts>
+const KernelTable<Real>* joined(std::string_view name) {
+    if constexpr (isa == IsaName::scalar || is_x86_64) {
+        static const KernelTable<Real> table = join<Real>(name, {part_table<isa, parts>()...}).value();
+        return &table;
+    } else {
+        return nullptr;
+    }
+}
+
+}  // namespace
+
 const KernelTable<float>* avx512_full_kernels() {
-    static const auto table = join("avx512.full", {avx512_full_first_hits(), avx512_full_all_hits()});
-    return table ? &*table : nullptr;
+    return joined<float, IsaName::avx512, Part::first_hit, Part::multi_hit>("avx512.full");
 }
-
+const KernelTable<float>* avx512_half_kernels() { return joined<float, IsaName::avx512, Part::half>("avx512.half"); }
 const KernelTable<float>* avx2_kernels() {
-    static const auto table = join("avx2", {avx2_first_hits(), avx2_all_hits()});
-    return table ? &*table : nullptr;
+    return joined<float, IsaName::avx2, Part::first_hit, Part::multi_hit>("avx2");
+}
+const KernelTable<float>* scalar_kernels() {
+    return joined<float, IsaName::scalar, Part::first_hit, Part::multi_hit>("scalar");
 }
 
-const KernelTable<float>* scalar_kernels() {
-    static const auto table = join("scalar", {scalar_first_hits(), scalar_all_hits()});
-    return table ? &*table : nullptr;
-}
+const KernelTable<double>* avx512_float64_kernels() { return joined<double, IsaName::avx512, Part::float64>("avx512"); }
+const KernelTable<double>* avx2_float64_kernels() { return joined<double, IsaName::avx2, Part::float64>("avx2"); }
+const KernelTable<double>* scalar_float64_kernels() { return joined<double, IsaName::scalar, Part::float64>("scalar"); }
 
 }  // namespace wive

@@ -9,11 +9,11 @@
 namespace wive {
 namespace {
 
-// Rays to a thread at a time: large enough that handing them out costs nothing, small enough to share well.
+// Rays that a thread takes at a time: enough to make taking them free, few enough to balance the threads.
 constexpr std::size_t rays_per_run = 1024;
-// Rays in flight where the caller leaves the choice: `python -m bench inflight` measures it.
+// Rays in flight if the caller leaves the choice, measured by `python -m bench inflight`.
 constexpr unsigned usual_in_flight = 24;
-// Fewer rays than this are traced one by one: filling and draining the flights would take most of the time.
+// A smaller batch is traced ray by ray: filling and draining the flights would take most of its time.
 constexpr std::size_t fewest_in_flight = 16;
 
 }  // namespace

@@ -34,14 +34,6 @@ NodeForm parse_nodes(const std::string& name) {
     return NodeForm::compressed;
 }
 
-ChildOrder parse_order(const std::string& name) {
-    if (name == "treelet") return ChildOrder::treelet;
-    if (name == "diagonal") return ChildOrder::diagonal;
-    if (name == "slots") return ChildOrder::slots;
-    expect(name == "none", "order: expected 'treelet', 'diagonal', 'slots' or 'none'");
-    return ChildOrder::none;
-}
-
 Quality parse_quality(const std::string& name) {
     if (name == "high") return Quality::high;
     expect(name == "medium", "quality: expected 'medium' or 'high'");
@@ -50,10 +42,9 @@ Quality parse_quality(const std::string& name) {
 
 template <class Real>
 std::unique_ptr<PyBvh> build(Array<Real> vertices, Array<std::int32_t> faces, const std::string& accuracy,
-                             const std::string& order, unsigned threads, int depth_limit, const std::string& nodes,
-                             const std::string& quality) {
-    const BuildOptions options = {
-        parse_accuracy(accuracy), parse_nodes(nodes), parse_order(order), threads, depth_limit, parse_quality(quality)};
+                             unsigned threads, int depth_limit, const std::string& nodes, const std::string& quality) {
+    const BuildOptions options = {parse_accuracy(accuracy), parse_nodes(nodes), threads, depth_limit,
+                                  parse_quality(quality)};
     return std::make_unique<PyBvh>(std::move(vertices), std::move(faces), options);
 }
 
@@ -146,8 +137,8 @@ PYBIND11_MODULE(_cpu, m, pybind11::mod_gil_not_used()) {
     PyBvhClass bvh(m, "Bvh");
     for_each_precision([&]<class Real>(Real) {
         bvh.def(py::init(&build<Real>), array_arg("vertices"), array_arg("faces"), py::arg("accuracy") = "watertight",
-                py::arg("order") = "treelet", py::arg("threads") = 0, py::arg("depth_limit") = max_depth,
-                py::arg("nodes") = "float32", py::arg("quality") = "medium");
+                py::arg("threads") = 0, py::arg("depth_limit") = max_depth, py::arg("nodes") = "float32",
+                py::arg("quality") = "medium");
         bvh.def(
             "refitted",
             [](const PyBvh& self, const Array<Real>& vertices, unsigned threads) {
@@ -160,12 +151,12 @@ PYBIND11_MODULE(_cpu, m, pybind11::mod_gil_not_used()) {
             "precision",
             [](const PyBvh& self) { return self.bvh().precision() == Precision::float32 ? "float32" : "float64"; })
         .def_property_readonly("nodes",
-                               [](py::object self) {
+                               [](const py::object& self) {
                                    const Bvh& bvh = self.cast<const PyBvh&>().bvh();
                                    return words(self, bvh.nodes(), bvh.node_bytes(), node_width);
                                })
         .def_property_readonly("blocks",
-                               [](py::object self) {
+                               [](const py::object& self) {
                                    const Bvh& bvh = self.cast<const PyBvh&>().bvh();
                                    if (bvh.precision() == Precision::float64)
                                        return words(self, bvh.blocks(), sizeof(TriangleBlockOf<double>), block_width);
@@ -175,7 +166,7 @@ PYBIND11_MODULE(_cpu, m, pybind11::mod_gil_not_used()) {
                                })
         .def_property_readonly(
             "units",
-            [](py::object self) {
+            [](const py::object& self) {
                 const Bvh& bvh = self.cast<const PyBvh&>().bvh();
                 return view(self,
                             {static_cast<py::ssize_t>(bvh.bytes() / unit_bytes), static_cast<py::ssize_t>(unit_words)},
@@ -193,7 +184,7 @@ PYBIND11_MODULE(_cpu, m, pybind11::mod_gil_not_used()) {
                                })
         .def_property_readonly("bounds",
                                [](const PyBvh& self) -> py::array {
-                                   const py::array_t<double> bounds({2, 3}, self.bvh().bounds()[0].data());
+                                   py::array_t<double> bounds({2, 3}, self.bvh().bounds()[0].data());
                                    if (self.bvh().precision() == Precision::float64) return bounds;
                                    return py::array_t<float>(bounds);
                                })

@@ -1,7 +1,7 @@
 // The ray queries of a tree, as Python calls them.
 #include <optional>
 
-#include "kernels/gather.h"
+#include "kernels/hit_collector.h"
 #include "kernels/trace.h"
 #include "python/bindings.h"
 
@@ -105,11 +105,11 @@ py::tuple intersect_all(const QueryCall<Real>& call) {
     const BvhView bvh = call.tree.bvh().view();
     std::int32_t* steps_data = steps.data();
     std::int64_t* offsets_data = offsets.mutable_data();
-    std::optional<Gathering<Real>> gathering;
+    std::optional<HitCollector<Real>> collector;
     {
         py::gil_scoped_release release;
-        gathering.emplace(call.kernels, kernel, bvh, call.rays, call.size(), steps_data, call.threads, call.in_flight);
-        gathering->write_offsets(offsets_data);
+        collector.emplace(call.kernels, kernel, bvh, call.rays, call.size(), steps_data, call.threads, call.in_flight);
+        collector->write_offsets(offsets_data);
     }
     const auto total = static_cast<py::ssize_t>(offsets_data[call.count]);
     Array<Real> t(total), uv({total, py::ssize_t{2}});
@@ -117,8 +117,8 @@ py::tuple intersect_all(const QueryCall<Real>& call) {
     const SortedHits<Real> hits = {offsets_data, t.mutable_data(), prim.mutable_data(), uv.mutable_data()};
     {
         py::gil_scoped_release release;
-        gathering->sort_into(hits);
-        gathering.reset();  // here, because long lists take a while to free
+        collector->sort_into(hits);
+        collector.reset();  // here, because long lists take a while to free
     }
     return py::make_tuple(std::move(offsets), std::move(t), std::move(prim), std::move(uv), steps.take());
 }

@@ -180,11 +180,12 @@ private:
 std::uint64_t render_rows(const RenderJob& job, int row_begin, int row_end, unsigned threads) {
     const int tiles = (job.width + tile_width - 1) / tile_width;
     std::atomic<std::uint64_t> rays{0};
-    parallel_for(static_cast<std::size_t>(tiles * (row_end - row_begin)), threads, [&](std::size_t i) {
-        const int row = row_begin + static_cast<int>(i) / tiles;
-        const int x = static_cast<int>(i) % tiles * tile_width;
-        rays += Wave(job).render(row, x, std::min(job.width, x + tile_width));
-    });
+    parallel_for(static_cast<std::size_t>(tiles) * static_cast<std::size_t>(row_end - row_begin), threads,
+                 [&](std::size_t i) {
+                     const int row = row_begin + static_cast<int>(i) / tiles;
+                     const int x = static_cast<int>(i) % tiles * tile_width;
+                     rays += Wave(job).render(row, x, std::min(job.width, x + tile_width));
+                 });
     return rays;
 }
 

@@ -3,7 +3,7 @@
 
 #include "traverse/slabs.h"
 
-namespace wive {
+namespace wive::WIVE_ISA {
 
 struct CompressedPlanes {
     using Node = CompressedNode;
@@ -46,4 +46,4 @@ struct CompressedLayout<float> : CompressedPlanes {
 template <class I>
 using CompressedSlabs = RaySlabs<I, CompressedLayout<typename I::Real>>;
 
-}  // namespace wive
+}  // namespace wive::WIVE_ISA

@@ -13,7 +13,7 @@
 #include "core/ray.h"
 #include "traverse/stack.h"
 
-namespace wive {
+namespace wive::WIVE_ISA {
 
 template <class I>
 struct BoxHits;  // slabs.h
@@ -181,4 +181,4 @@ concept Traversable =
     RayQuery<Query, typename I::Real> &&
     TriangleTest<Triangles<I>, typename Slabs<I>::Layout::template Corners<I>, Query>;
 
-}  // namespace wive
+}  // namespace wive::WIVE_ISA

@@ -5,7 +5,7 @@
 #include "core/layout.h"
 #include "traverse/concepts.h"
 
-namespace wive {
+namespace wive::WIVE_ISA {
 
 // Corners of a block that stores all of them; in a `fast` tree the rows of the second and third vertex hold the edges
 // from the first.
@@ -47,4 +47,4 @@ struct SharedCorners {
     [[gnu::always_inline]] unsigned used(unsigned hit_mask) const { return hit_mask & block.used(); }
 };
 
-}  // namespace wive
+}  // namespace wive::WIVE_ISA

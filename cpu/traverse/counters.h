@@ -6,7 +6,7 @@
 
 #include "core/layout.h"
 
-namespace wive {
+namespace wive::WIVE_ISA {
 
 struct NoCounters {
     [[gnu::always_inline]] void inner_node() {}
@@ -30,4 +30,4 @@ struct StepCounters {
     }
 };
 
-}  // namespace wive
+}  // namespace wive::WIVE_ISA

@@ -3,7 +3,7 @@
 
 #include "traverse/concepts.h"
 
-namespace wive {
+namespace wive::WIVE_ISA {
 
 template <Isa Base>
 struct Float64 : Base {
@@ -11,4 +11,4 @@ struct Float64 : Base {
     using Real4 = typename Base::Double4;
 };
 
-}  // namespace wive
+}  // namespace wive::WIVE_ISA

@@ -14,7 +14,7 @@
 #include "core/ray.h"
 #include "traverse/concepts.h"
 
-namespace wive {
+namespace wive::WIVE_ISA {
 
 // The direction is scaled by a power of two so that its largest component lies in [1, 2); t scales with it, and
 // both scalings are exact. Everything below is in these scaled units until a hit is written.
@@ -132,4 +132,4 @@ struct AxisFrame : RayFrame<I> {
     }
 };
 
-}  // namespace wive
+}  // namespace wive::WIVE_ISA

@@ -6,7 +6,7 @@
 #include "traverse/simd_avx512.h"
 #include "traverse/slabs.h"
 
-namespace wive {
+namespace wive::WIVE_ISA {
 
 // The upper half holds exit distances negated, so that one max serves both halves. Negating the reciprocal and the bias
 // of the far planes negates their distances.
@@ -53,4 +53,4 @@ private:
 };
 static_assert(SlabTest<HalfSlabs<Avx512>, Avx512>);
 
-}  // namespace wive
+}  // namespace wive::WIVE_ISA

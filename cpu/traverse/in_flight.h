@@ -13,7 +13,7 @@
 #include "traverse/packet.h"
 #include "traverse/traversal.h"
 
-namespace wive {
+namespace wive::WIVE_ISA {
 
 // A ray in flight.
 template <class Frame, class Query, class Counters>
@@ -233,4 +233,4 @@ void trace_batch(const BvhView& bvh, const RayBatch<typename I::Real>& rays, con
     }
 }
 
-}  // namespace wive
+}  // namespace wive::WIVE_ISA

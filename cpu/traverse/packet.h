@@ -16,7 +16,7 @@
 #include "traverse/packet_slabs.h"
 #include "traverse/traversal.h"
 
-namespace wive {
+namespace wive::WIVE_ISA {
 
 template <Isa I, template <class> class Slabs, template <class> class Triangles, class Query>
     requires Traversable<I, Slabs, Triangles, Query>
@@ -261,4 +261,4 @@ struct NoPackets {
     [[gnu::always_inline]] static bool trace_next(std::size_t, std::size_t) { return false; }
 };
 
-}  // namespace wive
+}  // namespace wive::WIVE_ISA

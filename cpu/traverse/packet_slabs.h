@@ -3,7 +3,7 @@
 
 #include "traverse/slabs.h"
 
-namespace wive {
+namespace wive::WIVE_ISA {
 
 // Bounds of the reciprocals and origins of a packet's rays, which share the octant and with it rows and order.
 struct PacketBounds {
@@ -59,4 +59,4 @@ struct PacketSlabs {
     }
 };
 
-}  // namespace wive
+}  // namespace wive::WIVE_ISA

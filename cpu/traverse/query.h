@@ -11,7 +11,7 @@
 #include "core/ray.h"
 #include "traverse/concepts.h"
 
-namespace wive {
+namespace wive::WIVE_ISA {
 
 // Query::InFlight is the variant for rays in flight, branch-free if that differs: there a misprediction also discards
 // work already issued for other rays. For a single ray the branch is faster.
@@ -105,4 +105,4 @@ template <class Block, class Real, OfferedQuery<Real> Query>
     return false;
 }
 
-}  // namespace wive
+}  // namespace wive::WIVE_ISA

@@ -5,7 +5,7 @@
 #include "core/ray.h"
 #include "traverse/hit_list.h"
 
-namespace wive {
+namespace wive::WIVE_ISA {
 
 // The number of triangles hit in [tmin, tmax].
 template <class Real>
@@ -59,4 +59,4 @@ struct AllHits {
     [[gnu::always_inline]] void write(const HitBatch<Real>& hits, std::size_t i, Real) const { hits.count[i] = count; }
 };
 
-}  // namespace wive
+}  // namespace wive::WIVE_ISA

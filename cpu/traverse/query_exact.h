@@ -5,7 +5,7 @@
 #include "traverse/exact_hit.h"
 #include "traverse/query.h"
 
-namespace wive {
+namespace wive::WIVE_ISA {
 
 // t is in the caller's units, the float nearest to the exact value. Rounding preserves order except for making unequal
 // values equal, so equal floats are compared exactly, and the best hit's triangle is remembered for that.
@@ -55,4 +55,4 @@ struct ExactClosestHit {
     }
 };
 
-}  // namespace wive
+}  // namespace wive::WIVE_ISA

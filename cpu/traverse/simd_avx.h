@@ -10,7 +10,7 @@
 
 #define WIVE_INLINE [[gnu::always_inline]] inline
 
-namespace wive {
+namespace wive::WIVE_ISA {
 
 struct SseFloat4;
 
@@ -189,4 +189,4 @@ struct Avx {
     using Pick = AvxPick;
 };
 
-}  // namespace wive
+}  // namespace wive::WIVE_ISA

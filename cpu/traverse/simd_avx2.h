@@ -7,7 +7,7 @@
 #include "traverse/simd_avx.h"
 #include "traverse/stack.h"
 
-namespace wive {
+namespace wive::WIVE_ISA {
 
 // The lanes set in each mask of eight, lowest first, in four bits each: 1 KB.
 inline constexpr std::array<std::uint32_t, 256> compress_table = [] {
@@ -50,4 +50,6 @@ struct Avx2 : Avx {
 };
 static_assert(Isa<Avx2>);
 
-}  // namespace wive
+using ThisIsa = Avx2;
+
+}  // namespace wive::WIVE_ISA

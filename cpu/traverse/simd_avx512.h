@@ -5,7 +5,7 @@
 #include "traverse/simd_avx.h"
 #include "traverse/stack.h"
 
-namespace wive {
+namespace wive::WIVE_ISA {
 
 struct Avx512 : Avx {
     template <bool in_order>
@@ -34,4 +34,6 @@ struct Avx512 : Avx {
 };
 static_assert(Isa<Avx512>);
 
-}  // namespace wive
+using ThisIsa = Avx512;
+
+}  // namespace wive::WIVE_ISA

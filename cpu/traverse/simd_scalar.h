@@ -1,9 +1,10 @@
 // The same operations in plain C++, for machines with neither AVX2 nor AVX-512 and as the reference for those.
 #pragma once
 
-#include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
+#include <type_traits>
 #include <utility>
 
 #include "traverse/stack.h"
@@ -12,103 +13,131 @@
 #define WIVE_INLINE [[gnu::always_inline]] inline
 #endif
 
-namespace wive {
+namespace wive::WIVE_ISA {
 
+// GCC's and Clang's portable vectors, in parts of 16 bytes: SSE2 on x86-64, NEON on Arm. (Loops over the lanes took GCC
+// three times as long to compile.)
 template <class Number, int width>
 struct ScalarLanes {
-    Number v[width];
+    using Bits = std::conditional_t<sizeof(Number) == sizeof(std::int32_t), std::int32_t, std::int64_t>;
+    static constexpr int part_width = 16 / sizeof(Number), parts = width / part_width;
+    typedef Number Part __attribute__((vector_size(16)));
+    typedef Bits PartMask __attribute__((vector_size(16)));
 
-    template <class Lane>
-    WIVE_INLINE static ScalarLanes each(Lane lane) {
+    Part part[parts];
+
+    template <class MakePart>
+    WIVE_INLINE static ScalarLanes each(MakePart make_part) {
         ScalarLanes r;
-        for (int i = 0; i < width; ++i) r.v[i] = lane(i);
+#pragma GCC unroll 2
+        for (int i = 0; i < parts; ++i) r.part[i] = make_part(i);
         return r;
     }
+    // One bit per lane, lane 0 lowest: the sign bit of each.
+    template <class MakePart>
+    WIVE_INLINE static unsigned sign_mask(MakePart make_part) {
+        unsigned bits = 0;
+#pragma GCC unroll 2
+        for (int i = 0; i < parts; ++i) bits |= sign_mask_of((PartMask)make_part(i)) << i * part_width;
+        return bits;
+    }
+    WIVE_INLINE static unsigned sign_mask_of(PartMask m) {
+#if defined(__SSE2__)
+        if constexpr (part_width == 4)
+            return static_cast<unsigned>(__builtin_ia32_movmskps((__attribute__((vector_size(16))) float)m));
+        else
+            return static_cast<unsigned>(__builtin_ia32_movmskpd((__attribute__((vector_size(16))) double)m));
+#else
+        unsigned bits = 0;
+        for (int i = 0; i < part_width; ++i) bits |= static_cast<unsigned>(m[i] < 0) << i;
+        return bits;
+#endif
+    }
+    static constexpr Bits sign_bit = std::numeric_limits<Bits>::min();
+
+    WIVE_INLINE Number lane(int i) const { return part[i / part_width][i % part_width]; }
     WIVE_INLINE static ScalarLanes load(const Number* p) {
-        return each([&](int i) { return p[i]; });
+        ScalarLanes r;
+        __builtin_memcpy(r.part, p, sizeof r.part);
+        return r;
     }
     WIVE_INLINE static ScalarLanes load(const std::uint8_t* p) {
-        return each([&](int i) { return static_cast<Number>(p[i]); });
+        return each([&](int i) {
+            const std::uint8_t* q = p + i * part_width;
+            return __builtin_convertvector(PartMask{q[0], q[1], q[2], q[3]}, Part);
+        });
     }
     WIVE_INLINE static ScalarLanes all(Number x) {
-        return each([&](int) { return x; });
+        if constexpr (part_width == 4)
+            return each([&](int) { return Part{x, x, x, x}; });
+        else
+            return each([&](int) { return Part{x, x}; });
     }
-    WIVE_INLINE static ScalarLanes set(Number x, Number y, Number z, Number w) { return {{x, y, z, w}}; }
-    WIVE_INLINE void store(Number* p) const {
-        for (int i = 0; i < width; ++i) p[i] = v[i];
+    WIVE_INLINE static ScalarLanes set(Number x, Number y, Number z, Number w) {
+        if constexpr (parts == 1)
+            return {{Part{x, y, z, w}}};
+        else
+            return {{Part{x, y}, Part{z, w}}};
     }
+    WIVE_INLINE void store(Number* p) const { __builtin_memcpy(p, part, sizeof part); }
     WIVE_INLINE friend ScalarLanes operator+(ScalarLanes a, ScalarLanes b) {
-        return each([&](int i) { return a.v[i] + b.v[i]; });
+        return each([&](int i) { return a.part[i] + b.part[i]; });
     }
     WIVE_INLINE friend ScalarLanes operator-(ScalarLanes a, ScalarLanes b) {
-        return each([&](int i) { return a.v[i] - b.v[i]; });
+        return each([&](int i) { return a.part[i] - b.part[i]; });
     }
     WIVE_INLINE friend ScalarLanes operator*(ScalarLanes a, ScalarLanes b) {
-        return each([&](int i) { return a.v[i] * b.v[i]; });
+        return each([&](int i) { return a.part[i] * b.part[i]; });
     }
     WIVE_INLINE friend ScalarLanes operator/(ScalarLanes a, ScalarLanes b) {
-        return each([&](int i) { return a.v[i] / b.v[i]; });
+        return each([&](int i) { return a.part[i] / b.part[i]; });
     }
     WIVE_INLINE friend ScalarLanes multiply_add(ScalarLanes a, ScalarLanes b, ScalarLanes c) { return a * b + c; }
     WIVE_INLINE friend ScalarLanes min(ScalarLanes a, ScalarLanes b) {
-        return each([&](int i) { return a.v[i] < b.v[i] ? a.v[i] : b.v[i]; });
+        return each([&](int i) { return a.part[i] < b.part[i] ? a.part[i] : b.part[i]; });
     }
     WIVE_INLINE friend ScalarLanes max(ScalarLanes a, ScalarLanes b) {
-        return each([&](int i) { return a.v[i] > b.v[i] ? a.v[i] : b.v[i]; });
+        return each([&](int i) { return a.part[i] > b.part[i] ? a.part[i] : b.part[i]; });
     }
     WIVE_INLINE friend ScalarLanes abs(ScalarLanes a) {
-        return each([&](int i) { return std::fabs(a.v[i]); });
+        return each([&](int i) { return (Part)((PartMask)a.part[i] & ~sign_bit); });
     }
     WIVE_INLINE friend ScalarLanes flip_sign(ScalarLanes a, ScalarLanes s) {
-        return each([&](int i) { return std::signbit(s.v[i]) ? -a.v[i] : a.v[i]; });
+        return each([&](int i) { return (Part)((PartMask)a.part[i] ^ ((PartMask)s.part[i] & sign_bit)); });
     }
     WIVE_INLINE friend Number highest_lane(ScalarLanes a) {
-        Number highest = a.v[0];
-        for (int i = 1; i < width; ++i) highest = highest < a.v[i] ? a.v[i] : highest;
+        Number highest = a.lane(0);
+#pragma GCC unroll 8
+        for (int i = 1; i < width; ++i) highest = highest < a.lane(i) ? a.lane(i) : highest;
         return highest;
     }
     WIVE_INLINE friend unsigned sign_bits(ScalarLanes a) {
-        unsigned bits = 0;
-        for (int i = 0; i < width; ++i) bits |= static_cast<unsigned>(std::signbit(a.v[i])) << i;
-        return bits;
+        return sign_mask([&](int i) { return a.part[i]; });
     }
     WIVE_INLINE friend unsigned less_equal(ScalarLanes a, ScalarLanes b) {
-        unsigned bits = 0;
-        for (int i = 0; i < width; ++i) bits |= static_cast<unsigned>(a.v[i] <= b.v[i]) << i;
-        return bits;
+        return sign_mask([&](int i) { return a.part[i] <= b.part[i]; });
     }
     WIVE_INLINE friend unsigned less(ScalarLanes a, ScalarLanes b) {
-        unsigned bits = 0;
-        for (int i = 0; i < width; ++i) bits |= static_cast<unsigned>(a.v[i] < b.v[i]) << i;
-        return bits;
+        return sign_mask([&](int i) { return a.part[i] < b.part[i]; });
+    }
+    WIVE_INLINE friend unsigned equal(ScalarLanes a, ScalarLanes b) {
+        return sign_mask([&](int i) { return a.part[i] == b.part[i]; });
     }
     WIVE_INLINE friend unsigned all_in_order(ScalarLanes a, ScalarLanes b, ScalarLanes c, ScalarLanes d, ScalarLanes e,
                                              ScalarLanes f) {
-        unsigned bits = 0;
-        for (int i = 0; i < width; ++i)
-            bits |= static_cast<unsigned>(a.v[i] <= b.v[i] && c.v[i] <= d.v[i] && e.v[i] < f.v[i]) << i;
-        return bits;
-    }
-    WIVE_INLINE friend unsigned equal(ScalarLanes a, ScalarLanes b) {
-        unsigned bits = 0;
-        for (int i = 0; i < width; ++i) bits |= static_cast<unsigned>(a.v[i] == b.v[i]) << i;
-        return bits;
-    }
-    WIVE_INLINE friend ScalarLanes<double, width> widen(ScalarLanes a) {
-        return ScalarLanes<double, width>::each([&](int i) { return static_cast<double>(a.v[i]); });
-    }
-    // From either precision: to float, and to this one.
-    WIVE_INLINE static ScalarLanes narrow(const auto& a) {
-        return each([&](int i) { return static_cast<Number>(a.v[i]); });
-    }
-    WIVE_INLINE static ScalarLanes of(const ScalarLanes<float, width>& a) {
-        return each([&](int i) { return static_cast<Number>(a.v[i]); });
+        return sign_mask(
+            [&](int i) { return (a.part[i] <= b.part[i]) & (c.part[i] <= d.part[i]) & (e.part[i] < f.part[i]); });
     }
     WIVE_INLINE friend unsigned one_sided(ScalarLanes low, ScalarLanes high) {
-        unsigned bits = 0;
-        for (int i = 0; i < width; ++i) bits |= static_cast<unsigned>((low.v[i] >= 0) | (high.v[i] <= 0)) << i;
-        return bits;
+        return sign_mask([&](int i) { return (low.part[i] >= Part{}) | (high.part[i] <= Part{}); });
     }
+    WIVE_INLINE friend ScalarLanes<double, width> widen(ScalarLanes a) { return ScalarLanes<double, width>::of(a); }
+    // From either precision: to float, and to this one.
+    WIVE_INLINE static ScalarLanes narrow(const auto& a) {
+        return set(static_cast<Number>(a.lane(0)), static_cast<Number>(a.lane(1)), static_cast<Number>(a.lane(2)),
+                   static_cast<Number>(a.lane(3)));
+    }
+    WIVE_INLINE static ScalarLanes of(const ScalarLanes<float, width>& a) { return narrow(a); }
 };
 
 // Which of eight lanes were hit. As AvxHits.
@@ -120,6 +149,7 @@ struct ScalarHits {
     WIVE_INLINE unsigned last() const { return 31 - static_cast<unsigned>(__builtin_clz(mask)); }
     WIVE_INLINE static ScalarHits of_child(const std::uint32_t* row, std::uint32_t child) {
         unsigned lanes = 0;
+#pragma GCC unroll 8
         for (int i = 0; i < node_width; ++i) lanes |= static_cast<unsigned>(row[i] == child) << i;
         return {lanes};
     }
@@ -139,9 +169,11 @@ struct Scalar {
     struct Order {
         std::uint32_t slots[node_width];
         WIVE_INLINE Order(const std::uint32_t* row, unsigned shift) {
+#pragma GCC unroll 8
             for (int i = 0; i < node_width; ++i) slots[i] = row[i] >> shift & 7u;
         }
         WIVE_INLINE Order(const std::uint8_t (*row)[3], unsigned shift) {
+#pragma GCC unroll 8
             for (int i = 0; i < node_width; ++i) {
                 const std::uint32_t lane = row[i][0] | std::uint32_t{row[i][1]} << 8 | std::uint32_t{row[i][2]} << 16;
                 slots[i] = lane >> shift & 7u;
@@ -155,7 +187,7 @@ struct Scalar {
         std::uint32_t index;
         WIVE_INLINE Pick(std::uint32_t word, int shift) : index(word >> shift) {}
         WIVE_INLINE Float4 operator()(const float* p) const {
-            return Float4::each([&](int i) { return p[index >> 4 * i & 7u]; });
+            return Float4::set(p[index & 7u], p[index >> 4 & 7u], p[index >> 8 & 7u], p[index >> 12 & 7u]);
         }
     };
 
@@ -165,40 +197,32 @@ struct Scalar {
     template <bool in_order>
     struct Lanes {
         Hits by_slot;
-        const Float8& tnear;
+        alignas(16) float tnear[node_width];
         const std::uint32_t* child;
         unsigned slots[node_width];
 
         WIVE_INLINE Lanes(const Order& order, Hits hit, const Float8& distances, const std::uint32_t* children)
-            : by_slot(hit), tnear(distances), child(children) {
+            : by_slot(hit), child(children) {
+            distances.store(tnear);
+#pragma GCC unroll 8
             for (int i = 0; i < node_width; ++i) slots[i] = in_order ? order.slot(i) : static_cast<unsigned>(i);
         }
         WIVE_INLINE void compress_to(Stack::Top top) const {
+#pragma GCC unroll 8
             for (const unsigned slot : slots) {  // always store, step on where it hit: no branch on the hit
-                top.distance() = tnear.v[slot];
+                top.distance() = tnear[slot];
                 top.child() = child[slot];
                 top.move(by_slot.mask >> slot & 1u);
             }
         }
         WIVE_INLINE std::uint32_t last_hit() const {
             int i = node_width - 1;
-            while (!(by_slot.mask >> slots[i] & 1u)) --i;
+            while (i > 0 && !(by_slot.mask >> slots[i] & 1u)) --i;
             return child[slots[i]];
         }
     };
 };
 
-// Scalar with the children sorted by true entry distance instead of the stored order: what sorting would buy.
-struct ScalarByDistance : Scalar {
-    template <bool in_order>
-    struct Lanes : Scalar::Lanes<in_order> {
-        WIVE_INLINE Lanes(const Order& order, Hits hit, const Float8& distances, const std::uint32_t* children)
-            : Scalar::Lanes<in_order>(order, hit, distances, children) {
-            for (int i = 1; i < node_width; ++i)
-                for (int k = i; k > 0 && distances.v[this->slots[k - 1]] < distances.v[this->slots[k]]; --k)
-                    std::swap(this->slots[k - 1], this->slots[k]);
-        }
-    };
-};
+using ThisIsa = Scalar;
 
-}  // namespace wive
+}  // namespace wive::WIVE_ISA

@@ -6,7 +6,7 @@
 #include "traverse/corners.h"
 #include "traverse/frame.h"
 
-namespace wive {
+namespace wive::WIVE_ISA {
 
 // Which boxes are hit, and where the ray enters each.
 template <class I>
@@ -112,4 +112,4 @@ struct RaySlabs {
 template <class I>
 using FullSlabs = RaySlabs<I, Float32Layout<typename I::Real>>;
 
-}  // namespace wive
+}  // namespace wive::WIVE_ISA

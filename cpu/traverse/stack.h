@@ -8,7 +8,7 @@
 
 #include "core/layout.h"
 
-namespace wive {
+namespace wive::WIVE_ISA {
 
 // Two parallel arrays: the child that is entered at distances[i] is children[i]. There is room for what a tree of
 // max_depth can leave behind, and for the unused lanes of the topmost vector store.
@@ -54,4 +54,4 @@ struct alignas(64) Stack {
     };
 };
 
-}  // namespace wive
+}  // namespace wive::WIVE_ISA

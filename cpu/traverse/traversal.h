@@ -26,7 +26,7 @@
 #include "traverse/query_all.h"
 #include "traverse/stack.h"
 
-namespace wive {
+namespace wive::WIVE_ISA {
 
 // Visits an inner node: pushes the children whose boxes are hit and moves top to the last of them, the nearest if
 // in_order; if none is hit, to the entry below. No branch: the steps are the same for no hit and for eight.
@@ -219,4 +219,4 @@ template <class Query, Isa I>
         return {ray.interval};
 }
 
-}  // namespace wive
+}  // namespace wive::WIVE_ISA

@@ -9,7 +9,7 @@
 #include "traverse/exact_hit.h"
 #include "traverse/frame.h"
 
-namespace wive {
+namespace wive::WIVE_ISA {
 
 // A ray with the caller's own numbers, because scaling a direction is not exact if its components differ by more than
 // the range of float, and because t must be rounded in the caller's units.
@@ -201,4 +201,4 @@ private:
     const Frame& ray_;
 };
 
-}  // namespace wive
+}  // namespace wive::WIVE_ISA

@@ -6,7 +6,7 @@
 #include "traverse/frame.h"
 #include "traverse/query.h"
 
-namespace wive {
+namespace wive::WIVE_ISA {
 
 template <class I>
 class FastTriangles {
@@ -82,4 +82,4 @@ private:
     Real4 origin_[3], direction_[3];
 };
 
-}  // namespace wive
+}  // namespace wive::WIVE_ISA

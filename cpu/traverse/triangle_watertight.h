@@ -15,7 +15,7 @@
 #include "traverse/query.h"
 #include "traverse/triangle_watertight_float64.h"
 
-namespace wive {
+namespace wive::WIVE_ISA {
 
 // A ray with the shear that makes it the z axis.
 template <Isa I>
@@ -210,4 +210,4 @@ private:
     Real4 origin_[3];
 };
 
-}  // namespace wive
+}  // namespace wive::WIVE_ISA

@@ -13,7 +13,7 @@
 #include "core/error_free.h"
 #include "traverse/frame.h"
 
-namespace wive {
+namespace wive::WIVE_ISA {
 
 // x1 y2 - y1 x2 with the exact sign, and zero only if it is exactly zero: the difference of the rounded products plus
 // what rounding took off them.
@@ -88,4 +88,4 @@ private:
     }
 };
 
-}  // namespace wive
+}  // namespace wive::WIVE_ISA

@@ -165,16 +165,6 @@ def test_surface_area_cost_counts_nodes_and_blocks() -> None:
     assert bvh.sah == pytest.approx((nodes, blocks), rel=1e-6)
 
 
-def test_without_order_every_octant_has_one_and_the_same_shuffled_sequence() -> None:
-    mesh = sphere(4)
-    ordered, shuffled = (_cpu.Bvh(*mesh, order=order) for order in ("treelet", "none"))
-    assert np.array_equal(ordered.nodes[:, :7], shuffled.nodes[:, :7])
-    sequences = [shuffled.nodes[:, 7] >> np.uint32(4 * octant) & np.uint32(7) for octant in range(8)]
-    assert all(np.array_equal(sequence, sequences[0]) for sequence in sequences)
-    assert (np.sort(sequences[0], axis=1) == np.arange(8)).all()
-    assert (sequences[0] != np.arange(8)).any()
-
-
 def test_the_largest_coordinates_make_a_sound_tree() -> None:
     random = np.random.default_rng(8)
     vertices = random.uniform(-9.9e17, 9.9e17, (6000, 3)).astype(np.float32)

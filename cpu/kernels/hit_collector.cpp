@@ -1,4 +1,4 @@
-#include "kernels/gather.h"
+#include "kernels/hit_collector.h"
 
 #include <algorithm>
 
@@ -7,7 +7,7 @@
 namespace wive {
 namespace {
 
-// Rays to a thread at a time when their hits are sorted.
+// Rays per piece of work when hits are sorted.
 constexpr std::size_t rays_per_sort = 4096;
 
 template <class Real>
@@ -22,15 +22,15 @@ bool comes_before(const Hit<Real>& a, const Hit<Real>& b) {
     return a.t != b.t ? a.t < b.t : a.prim < b.prim;
 }
 
-// Sorts rows [begin, end), by way of `together`, in which a hit stands in one piece.
+// Sorts rows [begin, end) through `scratch`, where the values of a hit are adjacent.
 template <class Real>
-void sort_rows(const SortedHits<Real>& hits, std::size_t begin, std::size_t end, std::vector<Hit<Real>>& together) {
-    together.clear();
+void sort_rows(const SortedHits<Real>& hits, std::size_t begin, std::size_t end, std::vector<Hit<Real>>& scratch) {
+    scratch.clear();
     for (std::size_t i = begin; i < end; ++i)
-        together.push_back({hits.t[i], hits.prim[i], hits.uv[2 * i], hits.uv[2 * i + 1]});
-    std::sort(together.begin(), together.end(), comes_before<Real>);
+        scratch.push_back({hits.t[i], hits.prim[i], hits.uv[2 * i], hits.uv[2 * i + 1]});
+    std::sort(scratch.begin(), scratch.end(), comes_before<Real>);
     for (std::size_t i = begin; i < end; ++i) {
-        const Hit<Real>& hit = together[i - begin];
+        const Hit<Real>& hit = scratch[i - begin];
         hits.t[i] = hit.t;
         hits.prim[i] = hit.prim;
         hits.uv[2 * i] = hit.u;
@@ -41,9 +41,9 @@ void sort_rows(const SortedHits<Real>& hits, std::size_t begin, std::size_t end,
 }  // namespace
 
 template <class Real>
-Gathering<Real>::Gathering(const KernelTable<Real>& table, TraceBatch<Real> kernel, const BvhView& bvh,
-                           const RayBatch<Real>& rays, std::size_t count, std::int32_t* stats, unsigned threads,
-                           unsigned in_flight)
+HitCollector<Real>::HitCollector(const KernelTable<Real>& table, TraceBatch<Real> kernel, const BvhView& bvh,
+                                 const RayBatch<Real>& rays, std::size_t count, std::int32_t* stats, unsigned threads,
+                                 unsigned in_flight)
     : threads_(thread_count(threads)), counts_(count), lists_(worker_count(count, threads)) {
     HitBatch<Real> hits;
     hits.count = counts_.data();
@@ -53,7 +53,7 @@ Gathering<Real>::Gathering(const KernelTable<Real>& table, TraceBatch<Real> kern
 }
 
 template <class Real>
-void Gathering<Real>::write_offsets(std::int64_t* offsets) const {
+void HitCollector<Real>::write_offsets(std::int64_t* offsets) const {
     std::int64_t sum = 0;
     for (std::size_t i = 0; i < counts_.size(); ++i) {
         offsets[i] = sum;
@@ -63,9 +63,9 @@ void Gathering<Real>::write_offsets(std::int64_t* offsets) const {
 }
 
 template <class Real>
-void Gathering<Real>::sort_into(const SortedHits<Real>& hits) {
+void HitCollector<Real>::sort_into(const SortedHits<Real>& hits) {
     Threads threads(threads_);
-    // A ray is traced by one worker, so its hits are in one list and its count has one writer.
+    // One worker traces a ray, so the ray's hits are in one list and its count has one writer.
     parallel_for(lists_.size(), threads, [&](std::size_t i) {
         lists_[i].drain([&](const FoundHit<Real>& hit) {
             const std::size_t row = static_cast<std::size_t>(hits.offsets[hit.ray] + --counts_[hit.ray]);
@@ -76,16 +76,16 @@ void Gathering<Real>::sort_into(const SortedHits<Real>& hits) {
         });
     });
     parallel_chunks(counts_.size(), rays_per_sort, threads, [&](std::size_t begin, std::size_t end) {
-        std::vector<Hit<Real>> together;
+        std::vector<Hit<Real>> scratch;
         for (std::size_t i = begin; i < end; ++i) {
             const auto first = static_cast<std::size_t>(hits.offsets[i]),
                        last = static_cast<std::size_t>(hits.offsets[i + 1]);
-            if (last - first > 1) sort_rows(hits, first, last, together);
+            if (last - first > 1) sort_rows(hits, first, last, scratch);
         }
     });
 }
 
-template class Gathering<float>;
-template class Gathering<double>;
+template class HitCollector<float>;
+template class HitCollector<double>;
 
 }  // namespace wive

@@ -1,11 +1,12 @@
-// AVX-512 with the children sorted by true entry distance instead of the stored order: what sorting would cost.
+// The AVX-512 kernels with the children sorted by true entry distance instead of the stored order: what sorting would
+// cost.
 #pragma once
 
 #include "traverse/simd_avx512.h"
 
-namespace wive {
+namespace wive::WIVE_ISA {
 
-struct Avx512ByDistance : Avx512 {
+struct ByDistance : Avx512 {
     template <bool in_order>
     struct Lanes : Avx512::Lanes<in_order> {
         WIVE_INLINE Lanes(Order stored, Hits hits, Float8 tnear, const std::uint32_t* child)
@@ -40,4 +41,4 @@ private:
     }
 };
 
-}  // namespace wive
+}  // namespace wive::WIVE_ISA
