@@ -5,6 +5,7 @@ Shapes: n rays, v vertices, f faces, m inner nodes, b triangle blocks. Every arr
 Users call `wive.Scene`, which checks arguments; here only what memory safety needs is checked.
 """
 
+from collections.abc import Sequence
 from typing import Any, Literal, TypeAlias
 
 import numpy as np
@@ -14,6 +15,7 @@ Real: TypeAlias = np.floating[Any]  # float32 or float64, the same for all array
 
 compiler: str  # the C++ compiler's name and version
 exact_source: str  # C++ text of the exact arithmetic, which the Warp kernels compile as well
+surface_source: str  # C++ text of ErrorBound and SpawnOrigin, which the Warp kernels compile as well
 
 def kernels() -> dict[str, str]:
     """Every traversal kernel compiled in, best first, and why this machine can't run it ("" if it can).
@@ -216,3 +218,32 @@ def surface_normals(
     vertices: NDArray[Real], faces: NDArray[np.int32], prim: NDArray[np.int32]
 ) -> NDArray[np.float64]:
     """(n,3) unit normals of triangles prim (n,), in double; NaN if there is no such triangle."""
+
+def error_bounds(
+    vertices: NDArray[Real],
+    faces: NDArray[np.int32],
+    prim: NDArray[np.int32],
+    t: NDArray[Real],
+    origins: NDArray[Real],
+    directions: NDArray[Real],
+    constants: Sequence[float],
+) -> NDArray[np.float64]:
+    """(n,) bounds on the error of t (n,), for rays (n,3) that hit triangles prim (n,); NaN for no triangle.
+
+    constants: the members of ErrorBound (cpu/core/error_bound.inc). The interpreter lock is released.
+    """
+
+def spawn_origins(
+    vertices: NDArray[Real],
+    faces: NDArray[np.int32],
+    prim: NDArray[np.int32],
+    uv: NDArray[Real],
+    directions: NDArray[Real],
+    accuracy: int,
+    constants: Sequence[float],
+) -> NDArray[Any]:
+    """(n,3) origins for directions (n,3) at uv (n,2) of triangles prim (n,); NaN for no triangle.
+
+    accuracy and constants: the members of SpawnOrigin (cpu/core/spawn.inc) other than is_float. The
+    interpreter lock is released.
+    """

@@ -1,56 +1,80 @@
-// Points and normals of hits, computed when they are asked for.
+// Points, normals, error bounds and spawned origins of hits, each computed at the call that asks for them.
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
+#include <type_traits>
 
 #include "core/parallel.h"
 #include "python/bindings.h"
+#include "surface_source.h"
 
 namespace wive {
 namespace {
 
-constexpr std::size_t hits_per_chunk = 1 << 12;
+// clang-format off
+#include "core/double3.inc"
+#include "core/error_bound.inc"
+#include "core/spawn.inc"
+// clang-format on
 
-// Calls row(i, corners of hit i, three values of the answer) for every hit, in double, on every core.
+static_assert(SpawnOrigin::fast == static_cast<int>(Accuracy::fast) &&
+              SpawnOrigin::watertight == static_cast<int>(Accuracy::watertight) &&
+              SpawnOrigin::exact == static_cast<int>(Accuracy::exact));
+
+constexpr std::size_t hits_per_chunk = 1 << 12;
+constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+
+using TriangleCorners = const double (*)[3];  // of a triangle, in double
+
+// Calls row(i, corners of hit i) for every hit, on every core and without the interpreter lock. The corners of a miss
+// are null.
 template <class Real, class Row>
-py::array_t<double> each_hit(const Array<Real>& vertices, const Array<std::int32_t>& faces,
-                             const Array<std::int32_t>& prim, const Row& row) {
+void for_each_hit(const Array<Real>& vertices, const Array<std::int32_t>& faces, const Array<std::int32_t>& prim,
+                  const Row& row) {
     expect_shape(vertices, 3, "vertices: expected shape (v, 3)");
     expect_shape(faces, 3, "faces: expected shape (f, 3)");
-    const py::ssize_t count = prim.size();
-    py::array_t<double> answer({count, py::ssize_t{3}});
-    double* out = answer.mutable_data();
     const std::int32_t *prims = prim.data(), *corners = faces.data();
     const Real* points = vertices.data();
     const auto face_count = static_cast<std::size_t>(faces.shape(0)),
                point_count = static_cast<std::size_t>(vertices.shape(0));
-    const auto hits = static_cast<std::size_t>(count);
+    const auto hits = static_cast<std::size_t>(prim.size());
     py::gil_scoped_release release;
     Threads threads(hits > hits_per_chunk ? thread_count(0) : 1);
     parallel_chunks(hits, hits_per_chunk, threads, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) {
             const auto face = static_cast<std::size_t>(static_cast<std::uint32_t>(prims[i]));
-            double corner[3][3] = {};
+            double corner[3][3];
             bool known = face < face_count;
             for (std::size_t k = 0; known && k < 3; ++k) {
                 const auto vertex = static_cast<std::size_t>(static_cast<std::uint32_t>(corners[3 * face + k]));
                 known = vertex < point_count;  // the arrays are the caller's, who may have changed them since
                 for (std::size_t axis = 0; known && axis < 3; ++axis) corner[k][axis] = points[3 * vertex + axis];
             }
-            row(i, known, corner, out + 3 * i);
+            row(i, known ? corner : nullptr);
         }
     });
-    return answer;
 }
 
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+// An array of three columns.
+template <class T>
+py::array_t<T> make_rows(py::ssize_t count) {
+    return py::array_t<T>({count, py::ssize_t{3}});
+}
 
-double on_triangle(const double (&corner)[3][3], double u, double v, int axis) {
+// That `array` has one row of so many columns per hit.
+template <class T>
+void expect_rows(const Array<T>& array, py::ssize_t columns, const Array<std::int32_t>& prim, const char* message) {
+    expect_shape(array, columns, message);
+    expect(array.shape(0) == prim.size(), message);
+}
+
+double on_triangle(TriangleCorners corner, double u, double v, int axis) {
     return (1 - u - v) * corner[0][axis] + u * corner[1][axis] + v * corner[2][axis];
 }
 
 // (v1 - v0) x (v2 - v0), along one axis.
-double normal_along(const double (&corner)[3][3], int axis) {
+double normal_along(TriangleCorners corner, int axis) {
     const int i = (axis + 1) % 3, j = (axis + 2) % 3;
     return (corner[1][i] - corner[0][i]) * (corner[2][j] - corner[0][j]) -
            (corner[1][j] - corner[0][j]) * (corner[2][i] - corner[0][i]);
@@ -59,46 +83,58 @@ double normal_along(const double (&corner)[3][3], int axis) {
 template <class Real>
 py::array_t<double> points(const Array<Real>& vertices, const Array<std::int32_t>& faces,
                            const Array<std::int32_t>& prim, const Array<Real>& uv) {
-    expect_shape(uv, 2, "uv: expected shape (n, 2)");
-    expect(uv.shape(0) == prim.size(), "uv: expected as many as prim");
+    expect_rows(uv, 2, prim, "uv: expected shape (n, 2), n as prim has");
     const Real* weights = uv.data();
-    return each_hit(vertices, faces, prim, [=](std::size_t i, bool known, const double (&corner)[3][3], double* out) {
+    auto answer = make_rows<double>(prim.size());
+    double* out = answer.mutable_data();
+    for_each_hit(vertices, faces, prim, [=](std::size_t i, TriangleCorners corner) {
         const double u = weights[2 * i], v = weights[2 * i + 1];
-        for (int axis = 0; axis < 3; ++axis) out[axis] = known ? on_triangle(corner, u, v, axis) : nan;
+        for (int axis = 0; axis < 3; ++axis) out[3 * i + axis] = corner ? on_triangle(corner, u, v, axis) : nan;
     });
+    return answer;
 }
 
 template <class Real>
 py::array_t<double> normals(const Array<Real>& vertices, const Array<std::int32_t>& faces,
                             const Array<std::int32_t>& prim) {
-    return each_hit(vertices, faces, prim, [](std::size_t, bool known, const double (&corner)[3][3], double* out) {
+    auto answer = make_rows<double>(prim.size());
+    double* out = answer.mutable_data();
+    for_each_hit(vertices, faces, prim, [=](std::size_t i, TriangleCorners corner) {
+        if (!corner) {
+            std::fill_n(out + 3 * i, 3, nan);
+            return;
+        }
         const double across[3] = {normal_along(corner, 0), normal_along(corner, 1), normal_along(corner, 2)};
         const double length = std::sqrt(across[0] * across[0] + across[1] * across[1] + across[2] * across[2]);
-        for (int axis = 0; axis < 3; ++axis) out[axis] = known ? across[axis] / length : nan;
+        for (int axis = 0; axis < 3; ++axis) out[3 * i + axis] = across[axis] / length;
     });
+    return answer;
 }
 
-// Where rays meet the planes of the triangles they hit, in double whatever the tree's precision; the point at u and v
-// where a ray is so flat that its plane says little.
+// Ray-plane intersection points in double, whatever the tree's precision; for grazing rays, where that is
+// ill-conditioned, the point at u and v instead.
 template <class Real>
 py::array_t<double> points_on_rays(const Array<double>& vertices, const Array<std::int32_t>& faces,
                                    const Array<std::int32_t>& prim, const Array<Real>& uv,
                                    const Array<std::int64_t>& ray, const Array<double>& origins,
                                    const Array<double>& directions) {
     constexpr double grazing = 1e-3;  // the sine of the angle
-    expect_shape(uv, 2, "uv: expected shape (n, 2)");
     expect_shape(origins, 3, "origins: expected shape (n, 3)");
     expect_shape(directions, 3, "directions: expected shape (n, 3)");
-    expect(uv.shape(0) == prim.size() && ray.size() == prim.size(), "uv, ray: expected as many as prim");
+    expect_rows(uv, 2, prim, "uv: expected shape (n, 2), n as prim has");
+    expect(ray.size() == prim.size(), "ray: expected as many as prim");
     expect(origins.shape(0) == directions.shape(0), "directions: expected as many as origins");
     const Real* weights = uv.data();
     const std::int64_t* rays = ray.data();
     const double *from = origins.data(), *along = directions.data();
     const auto ray_count = static_cast<std::uint64_t>(origins.shape(0));
-    return each_hit(vertices, faces, prim, [=](std::size_t i, bool known, const double (&corner)[3][3], double* out) {
+    auto answer = make_rows<double>(prim.size());
+    double* rows = answer.mutable_data();
+    for_each_hit(vertices, faces, prim, [=](std::size_t i, TriangleCorners corner) {
         const auto index = static_cast<std::uint64_t>(rays[i]);
-        if (!known || index >= ray_count) {
-            std::fill(out, out + 3, nan);
+        double* out = rows + 3 * i;
+        if (!corner || index >= ray_count) {
+            std::fill_n(out, 3, nan);
             return;
         }
         const double *o = from + 3 * index, *d = along + 3 * index;
@@ -115,17 +151,66 @@ py::array_t<double> points_on_rays(const Array<double>& vertices, const Array<st
         for (int axis = 0; axis < 3; ++axis)
             out[axis] = steep ? o[axis] + t * d[axis] : on_triangle(corner, u, v, axis);
     });
+    return answer;
+}
+
+// constants: the members of ErrorBound.
+template <class Real>
+py::array_t<double> error_bounds(const Array<Real>& vertices, const Array<std::int32_t>& faces,
+                                 const Array<std::int32_t>& prim, const Array<Real>& t, const Array<Real>& origins,
+                                 const Array<Real>& directions, const std::array<double, 3>& constants) {
+    expect(t.size() == prim.size(), "t: expected as many as prim");
+    expect_rows(origins, 3, prim, "origins: expected shape (n, 3), n as prim has");
+    expect_rows(directions, 3, prim, "directions: expected shape (n, 3), n as prim has");
+    const auto [rounding, margin, underflow] = constants;
+    const ErrorBound error = {rounding, margin, underflow};
+    const Real *distances = t.data(), *from = origins.data(), *along = directions.data();
+    py::array_t<double> answer(prim.size());
+    double* out = answer.mutable_data();
+    for_each_hit(vertices, faces, prim, [=](std::size_t i, TriangleCorners corner) {
+        const double origin[3] = {from[3 * i], from[3 * i + 1], from[3 * i + 2]};
+        const double direction[3] = {along[3 * i], along[3 * i + 1], along[3 * i + 2]};
+        out[i] = corner ? error.bound(corner, distances[i], origin, direction) : nan;
+    });
+    return answer;
+}
+
+// accuracy: of SpawnOrigin's; constants: the members of SpawnOrigin from point_error on.
+template <class Real>
+py::array_t<Real> spawn_origins(const Array<Real>& vertices, const Array<std::int32_t>& faces,
+                                const Array<std::int32_t>& prim, const Array<Real>& uv, const Array<Real>& directions,
+                                int accuracy, const std::array<double, 8>& constants) {
+    expect_rows(uv, 2, prim, "uv: expected shape (n, 2), n as prim has");
+    expect_rows(directions, 3, prim, "directions: expected shape (n, 3), n as prim has");
+    const auto [point, normal, corner_error, weights_error, fast, step, least, margin] = constants;
+    const SpawnOrigin spawn = {
+        accuracy, std::is_same_v<Real, float>, point, normal, corner_error, weights_error, fast, step, least, margin};
+    const Real *weights = uv.data(), *along = directions.data();
+    auto answer = make_rows<Real>(prim.size());
+    Real* out = answer.mutable_data();
+    for_each_hit(vertices, faces, prim, [=](std::size_t i, TriangleCorners corner) {
+        const double direction[3] = {along[3 * i], along[3 * i + 1], along[3 * i + 2]};
+        double origin[3] = {nan, nan, nan};
+        if (corner) spawn.write(corner, weights[2 * i], weights[2 * i + 1], direction, origin);
+        for (int axis = 0; axis < 3; ++axis) out[3 * i + axis] = static_cast<Real>(origin[axis]);
+    });
+    return answer;
 }
 
 }  // namespace
 
 void bind_surface(py::module_& m) {
+    m.attr("surface_source") = surface_source;
     for_each_precision([&]<class Real>(Real) {
         m.def("surface_points", &points<Real>, array_arg("vertices"), array_arg("faces"), array_arg("prim"),
               array_arg("uv"));
         m.def("points_on_rays", &points_on_rays<Real>, array_arg("vertices"), array_arg("faces"), array_arg("prim"),
               array_arg("uv"), array_arg("ray"), array_arg("origins"), array_arg("directions"));
         m.def("surface_normals", &normals<Real>, array_arg("vertices"), array_arg("faces"), array_arg("prim"));
+        m.def("error_bounds", &error_bounds<Real>, array_arg("vertices"), array_arg("faces"), array_arg("prim"),
+              array_arg("t"), array_arg("origins"), array_arg("directions"), py::arg("constants"));
+        m.def("spawn_origins", &spawn_origins<Real>, array_arg("vertices"), array_arg("faces"), array_arg("prim"),
+              array_arg("uv"), array_arg("directions"), py::arg("accuracy"), py::arg("constants"));
     });
 }
 

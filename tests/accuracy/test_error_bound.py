@@ -5,7 +5,16 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from support.error_bounds import SETS, Set, all_scales, broken, far_away, traced, well_conditioned
+from support.error_bounds import (
+    SETS,
+    Set,
+    all_scales,
+    broken,
+    crossed_sizes,
+    far_away,
+    traced,
+    well_conditioned,
+)
 from support.meshes import TRIANGLE, random_rays, soup
 
 import wive
@@ -68,7 +77,7 @@ def test_fast_errs_no_more_than_the_analysis_of_its_arithmetic_says(make: Callab
     d = directions[hits.mask].astype(np.float32).astype(np.float64)
 
     def sizes(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> np.ndarray:
-        return (abs(a.T) * error_bounds.crossed_sizes(b.T, c.T)).sum(axis=0)
+        return (abs(a) * crossed_sizes(b, c)).sum(axis=1)
 
     t = hits.t[hits.mask].astype(np.float64)
     det = abs((e1 * np.cross(d, e2)).sum(axis=1))

@@ -140,13 +140,17 @@ def test_spawned_rays_never_hit_their_own_triangle(shape: tuple[float, float, fl
 
 
 @pytest.mark.parametrize("accuracy", ACCURACIES)
-def test_points_not_moved_do_hit_again_so_these_rays_can_tell(
-    accuracy: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(spawn, "_offset", lambda surface, *_: np.zeros_like(surface.step))
-    monkeypatch.setattr(spawn, "_step_on", lambda _, point: point)
+def test_points_not_moved_do_hit_again_so_these_rays_can_tell(accuracy: str) -> None:
     scene, hits, incoming = hits_of(triangles(1.0, 1.0, 1.0), accuracy, dtype=np.float64)
-    assert own_hits(scene, hits, incoming) > len(hits)
+    assert own_hits(scene, hits, incoming, spawn=lambda _: hits.points()) > len(hits)
+
+
+@pytest.mark.parametrize("accuracy", ACCURACIES)
+def test_the_next_double_alone_is_not_far_enough(accuracy: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    no_offset = spawn.Rounding(*[0.0] * 8)
+    monkeypatch.setitem(spawn.ROUNDINGS, "float64", no_offset)
+    scene, hits, incoming = hits_of(triangles(1.0, 1.0, 1.0), accuracy, dtype=np.float64)
+    assert own_hits(scene, hits, incoming) > 0
 
 
 @pytest.mark.parametrize("accuracy", ACCURACIES)

@@ -45,8 +45,10 @@ def test_even_needles_keep_the_promise_in_watertight() -> None:
 
 @pytest.mark.parametrize("accuracy", ["fast", "watertight"])
 def test_a_fiftieth_of_the_offset_is_not_enough(accuracy: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    clearance = spawn.CLEARANCES[accuracy]
-    monkeypatch.setitem(spawn.CLEARANCES, accuracy, lambda *surface: 0.02 * clearance(*surface))
+    rounding = spawn.ROUNDINGS["float32"]
+    names = ["fast"] if accuracy == "fast" else ["corner", "weights"]
+    fiftieths = {name: 0.02 * getattr(rounding, name) for name in names}
+    monkeypatch.setitem(spawn.ROUNDINGS, "float32", rounding._replace(**fiftieths))
     assert sum(own_hits(*hits_of(triangles(*shape), accuracy)) for shape in EXPONENTS + SLIVERS) > 0
 
 

@@ -121,6 +121,12 @@ def crossed(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return np.stack([a[:, i - 2] * b[:, i - 1] - a[:, i - 1] * b[:, i - 2] for i in range(3)], axis=1)
 
 
+def crossed_sizes(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """The cross product with every term taken positive: bounds the rounding of the cross product."""
+    a, b = abs(a), abs(b)
+    return np.stack([a[:, i - 2] * b[:, i - 1] + a[:, i - 1] * b[:, i - 2] for i in range(3)], axis=1)
+
+
 def exact_t(hits: wive.Hits, origins: np.ndarray, directions: np.ndarray) -> np.ndarray:
     """t at which each line meets the plane of the triangle hit; None if the line is in the plane."""
     v0, v1, v2 = fractions(hits.vertices[hits.faces[hits.prim[hits.mask]]]).swapaxes(0, 1)

@@ -1,5 +1,7 @@
 """Triangles of any size and place, hits in them, and rays spawned from these hits."""
 
+from collections.abc import Callable
+
 import numpy as np
 
 import wive
@@ -62,11 +64,17 @@ def ways_out(hits: wive.Hits, incoming: np.ndarray, flattest: float = 1e-9) -> n
     return np.concatenate([np.asarray(way) for way in ways]).astype(hits.t.dtype)
 
 
-def own_hits(scene: wive.Scene, hits: wive.Hits, incoming: np.ndarray, flattest: float = 1e-9) -> int:
-    """The number of spawned rays that hit the triangle they left."""
+def own_hits(
+    scene: wive.Scene,
+    hits: wive.Hits,
+    incoming: np.ndarray,
+    flattest: float = 1e-9,
+    spawn: Callable[[np.ndarray], np.ndarray] | None = None,
+) -> int:
+    """The number of rays that hit the triangle they left, from the origins of `spawn`, or of hits.spawn."""
     count = 0
     for directions in ways_out(hits, incoming, flattest):
-        again = scene.intersect_all(hits.spawn(directions), directions)
+        again = scene.intersect_all((spawn or hits.spawn)(directions), directions)
         count += np.count_nonzero(again.prim == hits.prim[again.ray])
     return count
 

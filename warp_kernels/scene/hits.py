@@ -10,10 +10,11 @@ from typing import TYPE_CHECKING, Any
 import warp as wp
 from numpy.typing import ArrayLike
 
+from wive._internal.spawn import ACCURACIES
 from wive.all_hits import row_of
 from wive.warp_kernels.lanes.precision import PRECISIONS
 from wive.warp_kernels.scene.rays import WarpRays
-from wive.warp_kernels.scene.spawn import ACCURACIES, bounds_kernel, spawn_kernel
+from wive.warp_kernels.scene.spawn import bound_constants, bounds_kernel, spawn_constants, spawn_kernel
 from wive.warp_kernels.scene.surfaces import count_hits, hit_kernels, number_rays
 
 if TYPE_CHECKING:
@@ -48,14 +49,15 @@ class WarpHits:
     def error_bound(self) -> Any:
         """(n,) float64."""
         assert self._rays is not None
-        inputs = [*self._tracer.mesh, self.prim, self.t, self._rays.origins, self._rays.directions]
-        return self._computed(bounds_kernel(self._tracer.precision), wp.float64, inputs)
+        precision, rays = self._tracer.precision, [self._rays.origins, self._rays.directions]
+        inputs = [*self._tracer.mesh, self.prim, self.t, *rays, bound_constants(precision)]
+        return self._computed(bounds_kernel(precision), wp.float64, inputs)
 
     def spawn(self, directions: ArrayLike) -> Any:
         """(n,) vec3, or vec3d in a float64 scene."""
         precision, accuracy = self._tracer.precision, ACCURACIES.index(self._tracer.accuracy)
         rows = self._tracer.loader.directions(directions, len(self.prim))
-        inputs = [*self._tracer.mesh, self.prim, self.uv, rows, accuracy]
+        inputs = [*self._tracer.mesh, self.prim, self.uv, rows, accuracy, spawn_constants(precision)]
         return self._computed(spawn_kernel(precision), PRECISIONS[precision].vec3, inputs)
 
     def __len__(self) -> int:
