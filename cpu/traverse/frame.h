@@ -37,6 +37,7 @@ namespace wive::WIVE_ISA {
 // planes. A component smaller than 2^-30 of the longest is replaced by that, with its sign: along the
 // ray that moves a point by less than 2^-29 M, which the same slack covers. (A subnormal direction stays shorter than 1
 // when scaled.)
+//
 // Real is the precision of the caller's rays and of the triangle test.
 template <Isa I>
 struct RayFrame {
@@ -51,10 +52,11 @@ struct RayFrame {
     alignas(16) float near_bias[4];
     alignas(16) float far_bias[4];
     Interval<Real> interval;
-    Real scale;                             // t of the caller's ray = scale * t here
-    std::uint32_t near_row[3], far_row[3];  // the rows of planes that the ray meets first and last, in floats from a
-                                            // node's first plane
-    std::uint32_t order_shift;              // to the bits of the ray's octant, farthest first, of four bits per octant
+    Real scale;  // t of the caller's ray = scale * t here
+    // The rows of planes that the ray meets first and last on each axis, in planes from the node's first.
+    std::uint32_t near_row[3], far_row[3];
+    // The shift to the ray's octant in a lane of the order row, four bits per octant; farthest child first.
+    std::uint32_t order_shift;
     unsigned longest_axis;
 
     // Returns false if the ray hits nothing by rule: if its origin or direction is NaN or out of range, its direction
@@ -91,9 +93,9 @@ struct RayFrame {
         const Float4 reciprocal = flip_sign(size, scaled);
         const Float4 distance = relative * reciprocal, slack = size * Float4::all(magnitude * slack_factor);
         const unsigned octant = sign_bits(scaled) & 7u;  // bit a: negative on axis a, from the sign of the reciprocal
-        assert(octant < 8);
         order_shift = 4 * (7 - octant);  // farthest first, as the stack needs: octant 7 - o is octant o in reverse
         longest_axis = static_cast<unsigned>(std::countr_zero(less_equal(Real4::all(longest), lengths)));
+        assert(longest_axis < 3);
         for (unsigned axis = 0; axis < 3; ++axis) {
             near_row[axis] = node_width * (2 * axis + (octant >> axis & 1u));
             far_row[axis] = near_row[axis] ^ node_width;
@@ -110,8 +112,9 @@ struct RayFrame {
     [[gnu::always_inline]] bool is_finite() const {
         bool finite = interval.tmin <= interval.tmax;
         for (int axis = 0; axis < 3; ++axis)
-            finite = finite && std::isfinite(origin[axis]) && std::isfinite(direction[axis]) &&
-                     std::isfinite(rdir[axis]) && std::isfinite(near_bias[axis]) && std::isfinite(far_bias[axis]);
+            finite = finite && __builtin_isfinite(origin[axis]) && __builtin_isfinite(direction[axis]) &&
+                     __builtin_isfinite(rdir[axis]) && __builtin_isfinite(near_bias[axis]) &&
+                     __builtin_isfinite(far_bias[axis]);
         return finite;
     }
 };

@@ -1,6 +1,8 @@
 // The slab test of one ray against the eight boxes of a node.
 #pragma once
 
+#include <cassert>
+
 #include "core/layout.h"
 #include "traverse/concepts.h"
 #include "traverse/corners.h"
@@ -59,6 +61,7 @@ struct Float32Layout {
 // The shift to an octant's bits in a lane of the order row, from that of a frame, which counts four bits per octant.
 template <class Layout>
 [[gnu::always_inline]] constexpr unsigned order_shift_of(unsigned frame_shift) {
+    assert(frame_shift % 4 == 0 && frame_shift / 4 < 8);  // one of eight octants
     return frame_shift * Layout::order_bits / 4;
 }
 
