@@ -24,7 +24,7 @@ HANDLES = {"watertight": warp_kernels.Bvh, "fast": warp_kernels.FastBvh, "exact"
 def make_kernels(handle: type) -> tuple[wp.Kernel, wp.Kernel]:
     """A user's kernels for one type of handle."""
 
-    @wp.kernel
+    @wp.kernel(module="unique")
     def trace(
         bvh: handle,
         origins: wp.array(dtype=wp.vec3),
@@ -36,7 +36,7 @@ def make_kernels(handle: type) -> tuple[wp.Kernel, wp.Kernel]:
         hits[i] = warp_kernels.closest_hit(bvh, origins[i], directions[i], 0.0, wp.inf)
         occluded[i] = warp_kernels.any_hit(bvh, origins[i], directions[i], 0.0, wp.inf)
 
-    @wp.kernel
+    @wp.kernel(module="unique")
     def count(
         bvh: handle,
         origins: wp.array(dtype=wp.vec3),

@@ -15,7 +15,7 @@ pytestmark = pytest.mark.timeout(120)
 def weighing_kernel(handle: type) -> wp.Kernel:
     """A kernel whose loss depends on t and the point, for one type of handle."""
 
-    @wp.kernel
+    @wp.kernel(module="unique")
     def weigh(
         bvh: handle,
         vertices: wp.array(dtype=wp.vec3),
