@@ -31,10 +31,10 @@ def manifold_of(mesh: Mesh) -> "manifold3d.Manifold":
 
 
 def parity(
-    solid: "manifold3d.Manifold", origins: np.ndarray, directions: np.ndarray, reach: float
+    solid: "manifold3d.Manifold", origins: np.ndarray, directions: np.ndarray, length: float
 ) -> np.ndarray:
     starts = origins.astype(np.float64)
-    ends = starts + reach * directions.astype(np.float64)
+    ends = starts + length * directions.astype(np.float64)
     return np.array([len(solid.ray_cast(tuple(a), tuple(b))) % 2 for a, b in zip(starts, ends, strict=True)])
 
 

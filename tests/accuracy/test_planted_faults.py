@@ -133,12 +133,12 @@ def reached(
     longest = np.abs(directions).max(axis=1, keepdims=True)
     scaled = np.ldexp(directions, 1 - np.frexp(longest)[1]).astype(np.float32)
     relative = origins - bvh.center
-    reach = (bvh.extent + np.abs(relative)).max(axis=1, keepdims=True)
+    magnitude = (bvh.extent + np.abs(relative)).max(axis=1, keepdims=True)
     size = np.float32(1) / np.maximum(
         np.abs(scaled), np.abs(scaled).max(axis=1, keepdims=True) * np.float32(2.0**-30)
     )
     r = np.copysign(size, scaled)
-    distance, wider = relative * r, size * (reach * slack)
+    distance, wider = relative * r, size * (magnitude * slack)
     near, far = np.where(r[:, None] < 0, hi, lo), np.where(r[:, None] < 0, lo, hi)
     enter = (near * r[:, None] + -(distance + wider)[:, None]).max(axis=2).clip(min=0)
     leave = (far * r[:, None] + (wider - distance)[:, None]).min(axis=2)

@@ -119,8 +119,8 @@ def test_the_points_of_a_grid_inside_a_cube_with_a_cavity_are_found():
     mesh.ray = wive.trimesh.RayMeshIntersector(mesh)
     axis = np.arange(-2.5, 2.6, 0.25) + 0.125
     points = np.stack(np.meshgrid(axis, axis, axis), axis=-1).reshape(-1, 3)
-    reach = abs(points).max(axis=1)
-    np.testing.assert_array_equal(mesh.contains(points), (reach < 2) & (reach > 1))
+    farthest = abs(points).max(axis=1)
+    np.testing.assert_array_equal(mesh.contains(points), (farthest < 2) & (farthest > 1))
     np.testing.assert_array_equal(mesh.contains(np.zeros((0, 3))), np.zeros(0, bool))
 
 

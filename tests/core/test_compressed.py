@@ -54,8 +54,8 @@ def rays_at(mesh: Mesh, count: int, seed: int) -> Mesh:
     weights[weights.sum(axis=1) == 0] = (1, 0, 0)
     aims = (corners * (weights / weights.sum(axis=1, keepdims=True))[:, :, None]).sum(axis=1)
     low, high = vertices.min(axis=0).astype(np.float64), vertices.max(axis=0).astype(np.float64)
-    reach = np.array([0.5, 1.5, 1000.0])[np.arange(count) % 3, None]
-    origins = (low + high) / 2 + reach * (high - low).max() * random.uniform(-1, 1, (count, 3))
+    distance = np.array([0.5, 1.5, 1000.0])[np.arange(count) % 3, None]
+    origins = (low + high) / 2 + distance * (high - low).max() * random.uniform(-1, 1, (count, 3))
     origins[::7, 2] = aims[::7, 2]  # some components are zero
     origins = np.clip(origins, -1e18, 1e18).astype(np.float32)
     return origins, (aims - origins).astype(np.float32)

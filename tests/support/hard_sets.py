@@ -18,9 +18,9 @@ class HardSet(NamedTuple):
     directions: np.ndarray
 
 
-def few_bits(random: np.random.Generator, count: int, reach: int) -> np.ndarray:
+def few_bits(random: np.random.Generator, count: int, largest: int) -> np.ndarray:
     """(count,3) small integers, as float32."""
-    return random.integers(-reach, reach + 1, (count, 3)).astype(np.float32)
+    return random.integers(-largest, largest + 1, (count, 3)).astype(np.float32)
 
 
 def separate(count: int) -> np.ndarray:

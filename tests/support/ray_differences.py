@@ -4,8 +4,8 @@ Both sides compute in float32, so each may differ from the truth by its own roun
 is explained if the exact ray passes so close to a change of the result that rounding can move it across.
 How close is derived here to first order, with u = 2^-24, for a ray o + t d and a triangle v0 v1 v2. Its
 edges are e0 = v2 - v1, e1 = v1 - v0, e2 = v2 - v0, the longest L; its normal N = e1 x e2 has the angle
-theta to the ray. The reach S = max |v - o| bounds what is rounded first, v - o, with an error of u S; the
-hit is no further than S, L <= 2S, and L^2 >= |N|.
+theta to the ray. The corner distance S = max |v - o| bounds what is rounded first, v - o, with an error of
+u S; the hit is no further than S, L <= 2S, and L^2 >= |N|.
 
 Edges. Every test finds the distance from the ray to an edge as a product of d, the edge and a vertex
 relative to o, and so with an error in proportion to u S:
@@ -81,23 +81,23 @@ def cross_triangles(origins: Floats, directions: Floats, corners: Floats, *, fas
     normal = np.cross(edges[:, 0], -edges[:, 2])
     facing = np.einsum("ij,ij->i", normal, directions)
     speed = np.linalg.norm(directions, axis=1)
-    reach = np.linalg.norm(relative, axis=2).max(axis=1)
+    corner_distance = np.linalg.norm(relative, axis=2).max(axis=1)
     place = np.linalg.norm(origins, axis=1)
     with np.errstate(divide="ignore", invalid="ignore"):
         t = np.einsum("ij,ij->i", normal, relative[:, 0]) / facing
         slope = lengths.max(axis=1) ** 2 * speed / np.abs(facing)
 
-    margin = np.repeat(EDGE * reach[:, None], 3, axis=1)
+    margin = np.repeat(EDGE * corner_distance[:, None], 3, axis=1)
     if fast:
         margin[:, 1] *= lengths.sum(axis=1) / lengths[:, 1]
     margin = UNIT_ROUNDOFF * (margin + BOX * place[:, None])
     volumes = np.einsum("ij,ikj->ik", directions, np.cross(relative, edges)) * np.sign(facing)[:, None]
-    t_error = DEPTH * UNIT_ROUNDOFF * reach * slope / speed
+    t_error = DEPTH * UNIT_ROUNDOFF * corner_distance * slope / speed
     return Crossing(
         t=t,
         inside=(facing != 0) & (volumes >= 0).all(axis=1),
         near_edge=(distance_to_edges(directions / speed[:, None], relative) <= margin).any(axis=1),
-        roundoff=UNIT_ROUNDOFF * reach / speed,
+        roundoff=UNIT_ROUNDOFF * corner_distance / speed,
         slope=slope,
         t_error=t_error,
         order_error=t_error + BOX * UNIT_ROUNDOFF * place * slope / speed,
@@ -122,9 +122,9 @@ class Answers:
     prim: NDArray[np.int32]
 
 
-# What explains a difference. The first is about t alone: the same triangle, further apart than two ulp of the
-# reach, as its slope allows. The others are about which triangle: the ray meets the border of the one in
-# question; it meets two at the same distance; it does so at such a slope that "the same" is wide.
+# Explanations of a difference. The first is about t alone: the slope of the triangle allows values of t more
+# than two ulp of the corner distance apart. The others are about the triangle: the ray meets its border;
+# or it meets two triangles at the same t, or at values of t that differ by no more than the slopes allow.
 LABELS = ("steep t", "edge tie", "coincident", "grazing", "unexplained")
 STEEP = 64.0  # the slope from which a tie is called grazing: less than a degree on a well-shaped triangle
 
@@ -138,7 +138,7 @@ def explain(
     *,
     fast: bool,
 ) -> NDArray[np.str_]:
-    """For each ray one of LABELS, or "" where both miss, or hit the same triangle at the same t (two ulp).
+    """For each ray one of LABELS, or "" if both miss, or hit the same triangle at the same t (two ulp).
 
     `ours` is wive's side, whose t in watertight mode is held to half an ulp; `theirs` is Embree's.
     """

@@ -37,6 +37,6 @@ def test_every_operation_is_rounded_on_its_own_on_cuda(tmp_path, name, architect
     for kernel in kernels:
         assert re.search(rf"\.entry \w*{kernel}_\w+_cuda_kernel_forward\(", ptx)
     found = set(ARITHMETIC.findall(ptx))
-    # PTX writes "rn" where it rounds once to nearest; add and sub without it may be fused with a mul.
+    # PTX writes "rn" for a single rounding to nearest; add and sub without it may be fused with a mul.
     assert any(operation.startswith("sqrt.rn") for operation in found)
     assert not [name for name in found if ".rn." not in name or name.startswith(("fma", "mad"))]
