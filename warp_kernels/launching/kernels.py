@@ -81,7 +81,7 @@ def make_kernel(
 
     @wp.func
     def trace(tree: tree_type, ray: frame_type, lane: int, found: found_type) -> result_type:
-        """What the traversal finds; nothing if the ray is refused or a tree's kernel has failed."""
+        """The traversal's result; nothing is found if the ray is invalid or the error flag is set."""
         result = result_type()
         result.found = found
         # One answer for the ray's threads, which may see the flag change at different times.

@@ -93,7 +93,7 @@ def compressed_block(lanes: SimpleNamespace) -> SimpleNamespace:
     def block_at(units: wp.uint64, begin: int, i: int):
         at = int(begin)
         for _ in range(i):  # rarely more than once
-            at += 4 * stride(units, at)  # units of eight words, half as many as vertices
+            at += 4 * stride(units, at)  # one unit of eight words per two vertices
         return at
 
     @wp.func
