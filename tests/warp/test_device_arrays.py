@@ -245,6 +245,19 @@ def test_the_library_of_each_array_is_looked_up_once(scene, backend, device, mon
     assert len(looked_up) == 4
 
 
+def test_an_array_with_nothing_but_the_cuda_interface_has_a_length_for_warp(monkeypatch):
+    class OnlyInterface:
+        __cuda_array_interface__ = {"shape": (4, 3), "typestr": "<f4", "data": (256, False), "version": 2}  # noqa: RUF012
+
+    given = []
+    monkeypatch.setattr(wp, "array", lambda data, device, copy: given.append((data, device, copy)))
+    array = OnlyInterface()
+    wive._internal.arrays.CUDA_INTERFACE.to_warp(array, "cuda:0")
+    ((data, device, copy),) = given
+    assert (len(data), device, copy) == (4, "cuda:0", False)  # Warp refuses data without a length
+    assert data.__cuda_array_interface__ == array.__cuda_array_interface__
+
+
 def test_hits_on_a_device_keep_what_they_are_made_of(device):
     hits = wive.Scene(*MESH, device=device).intersect(
         *(wp.array(rows, dtype=wp.vec3, device=device) for rows in RAYS)

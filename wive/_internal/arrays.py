@@ -214,14 +214,26 @@ class CudaInterfaceArrays(_OnWarpStream):
         """An array over the same memory, ordered behind the stream that the interface names."""
         import warp as wp
 
-        stream = array.__cuda_array_interface__.get("stream")
+        sized = _SizedInterface(array)
+        stream = sized.__cuda_array_interface__.get("stream")
         if stream is not None:
             wp.get_stream(device).wait_stream(wp.Stream(device, cuda_stream=stream))
-        return wp.array(data=array, device=device, copy=False)
+        return wp.array(data=sized, device=device, copy=False)
 
     def from_warp(self, array: Any) -> Any:
         """The Warp array, with vectors as rows."""
         return _rows(array)
+
+
+class _SizedInterface:
+    """An array's `__cuda_array_interface__` with a length: Warp refuses objects that have none."""
+
+    def __init__(self, array: Any) -> None:
+        self._array = array  # lives as long as the Warp array over its memory
+        self.__cuda_array_interface__: dict[str, Any] = array.__cuda_array_interface__
+
+    def __len__(self) -> int:
+        return int(self.__cuda_array_interface__["shape"][0])
 
 
 NUMPY = NumPyArrays()
