@@ -25,10 +25,10 @@ static_assert(SpawnOrigin::fast == static_cast<int>(Accuracy::fast) &&
 constexpr std::size_t hits_per_chunk = 1 << 12;
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 
-using TriangleCorners = const double (*)[3];  // of a triangle, in double
+using TriangleCorners = const double (*)[3];
 
-// Calls row(i, corners of hit i) for every hit, on every core and without the interpreter lock. The corners of a miss
-// are null.
+// Calls row(i, corners of the triangle of hit i, in double) on every core, with the interpreter lock released. The
+// corners of a miss are null.
 template <class Real, class Row>
 void for_each_hit(const Array<Real>& vertices, const Array<std::int32_t>& faces, const Array<std::int32_t>& prim,
                   const Row& row) {
@@ -62,7 +62,7 @@ py::array_t<T> make_rows(py::ssize_t count) {
     return py::array_t<T>({count, py::ssize_t{3}});
 }
 
-// That `array` has one row of so many columns per hit.
+// Throws unless `array` has that many columns and one row per hit.
 template <class T>
 void expect_rows(const Array<T>& array, py::ssize_t columns, const Array<std::int32_t>& prim, const char* message) {
     expect_shape(array, columns, message);
@@ -175,7 +175,7 @@ py::array_t<double> error_bounds(const Array<Real>& vertices, const Array<std::i
     return answer;
 }
 
-// accuracy: of SpawnOrigin's; constants: the members of SpawnOrigin from point_error on.
+// accuracy: as SpawnOrigin numbers them; constants: the members of SpawnOrigin from point_error on.
 template <class Real>
 py::array_t<Real> spawn_origins(const Array<Real>& vertices, const Array<std::int32_t>& faces,
                                 const Array<std::int32_t>& prim, const Array<Real>& uv, const Array<Real>& directions,

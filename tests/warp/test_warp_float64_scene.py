@@ -84,6 +84,24 @@ def test_spawned_origins_in_survey_coordinates_are_those_of_the_cpu(accuracy: st
     np.testing.assert_array_equal(as_rows(found.error_bound), on_cpu.error_bound)
 
 
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_special_directions_spawn_the_origins_of_the_cpu(dtype: type[np.floating[Any]]) -> None:
+    limits = np.finfo(dtype)
+    numbers = [0.0, -0.0, np.inf, -np.inf, np.nan, limits.smallest_subnormal, -limits.tiny, limits.max, -1.0]
+    directions = np.array(np.meshgrid(numbers, numbers, numbers), dtype).reshape(3, -1).T.copy()
+    vertices, faces = (dtype(1e-12) * soup64(1, seed=3)[0].astype(dtype)), np.array([[0, 1, 2]])
+    rays = np.full_like(directions, vertices.mean(axis=0) - dtype(1e-12)), np.ones_like(directions)
+    vec3 = wp.vec3 if dtype is np.float32 else wp.vec3d
+    *given_rays, given = (wp.array(rows, dtype=vec3, device="cpu") for rows in (*rays, directions))
+    for accuracy in ("fast", "watertight"):
+        expected = wive.Scene(vertices, faces, accuracy=accuracy).intersect(*rays)
+        found = wive.Scene(vertices, faces, device="cpu", accuracy=accuracy).intersect(*given_rays)
+        assert expected.mask.all() and expected.t.dtype == dtype
+        origins = expected.spawn(directions)
+        assert len(np.unique(origins, axis=0)) == 2  # both sides
+        np.testing.assert_array_equal(as_rows(found.spawn(given)), origins)
+
+
 @pytest.mark.parametrize("dtype", [wp.vec3, wp.float32])
 def test_rays_of_float32_on_the_device_are_refused_in_one_line(
     dtype: type, scenes: tuple[wive.Scene, wive.Scene]
