@@ -10,11 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wive._internal.precision import Floats
+from wive._internal.read_only import ReadOnly
 from wive._internal.wrapping import Wrapping, from_home
 from wive.hits import surface_normals, surface_points
 
 
-class AllHits:
+class AllHits(ReadOnly):
     """All hits of n rays, h in all: ray by ray, each ray's by ascending t, at equal t by ascending prim.
 
     Arrays are NumPy's if the rays were, else of the library and on the device that the rays came in;
@@ -32,7 +33,12 @@ class AllHits:
     t, uv and vertices are float64 for a float64 scene.
     """
 
-    __slots__ = ("__weakref__", "faces", "offsets", "prim", "t", "uv", "vertices")
+    offsets: NDArray[np.int64]
+    t: Floats
+    prim: NDArray[np.int32]
+    uv: Floats
+    vertices: Floats
+    faces: NDArray[np.int32]
 
     def __init__(
         self,
@@ -44,8 +50,7 @@ class AllHits:
         faces: NDArray[np.int32],
     ) -> None:
         """Keep the arrays."""
-        self.offsets, self.t, self.prim, self.uv = offsets, t, prim, uv
-        self.vertices, self.faces = vertices, faces
+        vars(self).update(offsets=offsets, t=t, prim=prim, uv=uv, vertices=vertices, faces=faces)
 
     @property
     def counts(self) -> NDArray[np.int32]:
@@ -88,13 +93,14 @@ class AllHits:
 class WrappedAllHits(AllHits):
     """All hits in the arrays of another library than the backend's; `_home` holds the backend's arrays."""
 
-    __slots__ = ("_home", "_wrapping")
+    _home: Any
+    _wrapping: Wrapping
 
     def __init__(self, home: Any, wrapping: Wrapping) -> None:
         """Wrap the arrays of `home`, an `AllHits` or a `WarpAllHits`; all else is computed when used."""
         offsets, t, prim, uv = map(wrapping.wrap, (home.offsets, home.t, home.prim, home.uv))
         super().__init__(offsets, t, prim, uv, home.vertices, home.faces)
-        self._home, self._wrapping = home, wrapping
+        vars(self).update(_home=home, _wrapping=wrapping)
 
     counts = from_home(AllHits.counts)
     ray = from_home(AllHits.ray)

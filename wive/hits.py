@@ -13,6 +13,7 @@ from wive._internal.arrays import Library, host_array
 from wive._internal.error_bounds import t_error_bounds
 from wive._internal.precision import Floats, real_of
 from wive._internal.rays import Rays
+from wive._internal.read_only import ReadOnly
 from wive._internal.spawn import spawn_origins
 from wive._internal.wrapping import Wrapping, from_home
 
@@ -44,7 +45,7 @@ def surface_normals(
     return _cpu.surface_normals(vertices, faces, np.ascontiguousarray(prim))
 
 
-class Hits:
+class Hits(ReadOnly):
     """The closest hit of each of n rays.
 
     Arrays are NumPy's if the rays were, else of the library and on the device that the rays came in;
@@ -60,13 +61,13 @@ class Hits:
     t, uv and vertices are float64 for a float64 scene.
     """
 
-    __slots__ = ("__weakref__", "_accuracy", "_rays", "faces", "prim", "t", "uv", "vertices")
-
     t: Floats
     prim: NDArray[np.int32]
     uv: Floats
     vertices: Floats
     faces: NDArray[np.int32]
+    _rays: Rays | None
+    _accuracy: str
 
     def __init__(
         self,
@@ -79,8 +80,9 @@ class Hits:
         accuracy: str = "",
     ) -> None:
         """Keep the arrays; a scene adds its rays and accuracy, for `error_bound` and `spawn`."""
-        self.t, self.prim, self.uv, self.vertices, self.faces = t, prim, uv, vertices, faces
-        self._rays, self._accuracy = rays, accuracy
+        vars(self).update(
+            t=t, prim=prim, uv=uv, vertices=vertices, faces=faces, _rays=rays, _accuracy=accuracy
+        )
 
     @property
     def mask(self) -> NDArray[np.bool_]:
@@ -155,13 +157,14 @@ class Hits:
 class WrappedHits(Hits):
     """Hits in the arrays of another library than the backend's; `_home` holds the backend's arrays."""
 
-    __slots__ = ("_home", "_wrapping")
+    _home: Any
+    _wrapping: Wrapping
 
     def __init__(self, home: Any, wrapping: Wrapping) -> None:
         """Wrap t, prim and uv of `home`, a `Hits` or a `WarpHits`; all else is computed when used."""
         t, prim, uv = map(wrapping.wrap, (home.t, home.prim, home.uv))
         super().__init__(t, prim, uv, home.vertices, home.faces)
-        self._home, self._wrapping = home, wrapping
+        vars(self).update(_home=home, _wrapping=wrapping)
 
     mask = from_home(Hits.mask)
     points = from_home(Hits.points)

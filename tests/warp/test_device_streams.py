@@ -112,6 +112,16 @@ def test_scenes_are_on_their_device_before_a_query_on_any_stream(device, monkeyp
     assert {"array", "launch"} < set(events)
     assert events[-1] == "wait"
     hits = scene.intersect(*rays)
+    hits.points()
     events.clear()
     hits.points()
     assert events.count("array") == 1  # the points: the mesh is on the device already
+
+
+def test_the_mesh_is_copied_to_the_device_when_first_used(device):
+    scene = wive.Scene(*MESH, device=device)
+    hits = scene.intersect(*(on_device(rows, device) for rows in RAYS))
+    assert hits.mask is not None
+    assert "mesh" not in vars(scene._tracer)
+    hits.normals()
+    assert "mesh" in vars(scene._tracer)

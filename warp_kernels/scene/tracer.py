@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
@@ -53,19 +54,35 @@ class WarpTracer:
     lacks = ("threads", "in_flight")
 
     def __init__(self, bvh: _cpu.Bvh, faces: NDArray[np.int32], device: str) -> None:
-        """Copy tree and mesh to the device, and wait until they are there: queries may use any stream."""
+        """Copy the tree to the device, and wait until it is there: queries may use any stream."""
         self.bvh, self.device = bvh, device
         self.vertices, self.faces = bvh.vertices, faces
         self.accuracy, self.precision = bvh.accuracy, bvh.precision
         self.tree = upload(bvh, device)
         self.loader = RayLoader(device, bvh.precision)
         self._numbers = PRECISIONS[bvh.precision]
-        # (v,) vec3 or vec3d and (f,) vec3i; on the host they share the scene's memory.
-        self.mesh = (
-            wp.array(self.vertices, dtype=self._numbers.vec3, device=device, copy=False),
-            wp.array(faces, dtype=wp.vec3i, device=device, copy=False),
-        )
         wp.synchronize_stream(device)
+
+    @functools.cached_property
+    def mesh(self) -> tuple[Any, Any]:
+        """Vertices (v,) vec3 or vec3d and faces (f,) vec3i on the device, for points, normals and bounds.
+
+        Copied when first used, and waited for: later uses may be on any stream. On the host they share the
+        scene's memory. RuntimeError if a graph is being captured, since nothing can wait then.
+        """
+        stream = wp.get_stream(self.device) if self.device != "cpu" else None
+        if stream is not None and stream.is_capturing:
+            raise RuntimeError(
+                "points, normals, error_bound and spawn copy the mesh to the device when first used: "
+                "use one of them once before the graph is captured"
+            )
+        mesh = (
+            wp.array(self.vertices, dtype=self._numbers.vec3, device=self.device, copy=False),
+            wp.array(self.faces, dtype=wp.vec3i, device=self.device, copy=False),
+        )
+        if stream is not None:
+            wp.synchronize_stream(stream)
+        return mesh
 
     def intersect(self, rays: Rays, work: Work) -> tuple[Hits, Stats | None]:
         """Closest hits."""
