@@ -70,7 +70,8 @@ def test_scenes_of_cpu_backends_do_not_look_at_the_version_of_warp(monkeypatch):
 def test_hits_can_be_pickled_and_copied_and_equal_themselves_alone(query):
     scene = wive.Scene(*sphere(2))
     hits = getattr(scene, query)(np.zeros((5, 3), np.float32), np.eye(5, 3, dtype=np.float32))
-    for again in (pickle.loads(pickle.dumps(hits)), copy.copy(hits), copy.deepcopy(hits)):
+    pickled = [pickle.loads(pickle.dumps(hits, protocol)) for protocol in range(pickle.HIGHEST_PROTOCOL + 1)]
+    for again in (*pickled, copy.copy(hits), copy.deepcopy(hits)):
         assert type(again) is type(hits)
         assert repr(again) == repr(hits)
         assert again != hits
@@ -81,3 +82,12 @@ def test_hits_can_be_pickled_and_copied_and_equal_themselves_alone(query):
         np.testing.assert_array_equal(pickle.loads(pickle.dumps(hits)).error_bound, hits.error_bound)
     assert hits == hits
     assert len({hits, hits}) == 1
+
+
+@pytest.mark.parametrize("query", ["intersect", "intersect_all"])
+def test_hits_are_read_only(query):
+    hits = getattr(wive.Scene(*TRIANGLE), query)(np.zeros((1, 3)), np.ones((1, 3)))
+    with pytest.raises(AttributeError, match="read-only"):
+        hits.t = hits.t + 1
+    with pytest.raises(AttributeError, match="read-only"):
+        del hits.prim
