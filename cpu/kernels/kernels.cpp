@@ -60,8 +60,8 @@ constexpr bool is_x86_64 = false;
 template <class Real, IsaName isa, Part... parts>
 const KernelTable<Real>* joined(std::string_view name) {
     if constexpr (isa == IsaName::scalar || is_x86_64) {
-        static const KernelTable<Real> table = join<Real>(name, {part_table<isa, parts>()...}).value();
-        return &table;
+        static const auto table = join<Real>(name, {part_table<isa, parts>()...});
+        return table ? &*table : nullptr;
     } else {
         return nullptr;
     }
