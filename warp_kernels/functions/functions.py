@@ -8,11 +8,11 @@ from typing import Any
 import warp as wp
 
 from wive.warp_kernels.lanes.lanes import without_gradient
+from wive.warp_kernels.lanes.layout import NO_PRIM
 from wive.warp_kernels.queries.frame import LOAD_FRAME
 from wive.warp_kernels.queries.query_exact import query_of
 from wive.warp_kernels.traversal.traversal import make_traversal
 from wive.warp_kernels.tree.handle import ACCURACIES, HANDLES, STACK_TOO_SMALL, WRONG_ACCURACY, Hit
-from wive.warp_kernels.tree.layout import NO_PRIM
 
 # A tree of 2.7 million triangles needs less than 100; deeper trees are refused by the error flag.
 STACK_SIZE = 128

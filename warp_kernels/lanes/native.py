@@ -3,7 +3,7 @@
 Names that end in 8 or 4 are for lanes=8, one thread per ray; those in 1 for lanes=1, eight threads per ray.
 """
 
-from wive.warp_kernels.tree.layout import COMPRESSED_PLANES, COMPRESSED_RANKS, COMPRESSED_STEP, NUMBER_BITS
+from wive.warp_kernels.lanes.layout import COMPRESSED_PLANES, COMPRESSED_RANKS, COMPRESSED_STEP, NUMBER_BITS
 
 # Eight threads are one group, aligned within their warp.
 _GROUP_MASK = "const unsigned group = 0xffu << (threadIdx.x & 24u);"

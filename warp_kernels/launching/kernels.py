@@ -10,13 +10,13 @@ from types import SimpleNamespace
 import warp as wp
 
 from wive.warp_kernels.lanes.lanes import collectives
+from wive.warp_kernels.lanes.layout import ALL_BITS, NO_PRIM
 from wive.warp_kernels.lanes.precision import PRECISIONS
 from wive.warp_kernels.queries.frame import FRAMES, LOAD_FRAME, box_tmax
 from wive.warp_kernels.queries.query_exact import query_of
 from wive.warp_kernels.traversal.states import TRAVERSALS
 from wive.warp_kernels.traversal.traversal import make_traversal
 from wive.warp_kernels.tree.handle import HANDLES, HITS
-from wive.warp_kernels.tree.layout import ALL_BITS, NO_PRIM
 
 # Multiplications and additions stay apart: fused, the two triangles at an edge would not compute the same
 # numbers.

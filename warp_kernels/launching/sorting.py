@@ -4,9 +4,9 @@ import functools
 
 import warp as wp
 
+from wive.warp_kernels.lanes.layout import NO_PRIM
 from wive.warp_kernels.lanes.precision import PRECISIONS
 from wive.warp_kernels.tree.handle import HITS
-from wive.warp_kernels.tree.layout import NO_PRIM
 
 # Shorter lists are sorted by insertion: fewer moves than a heap makes.
 SHORT = 16

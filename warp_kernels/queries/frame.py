@@ -5,8 +5,8 @@ Operation by operation as cpu/traverse/frame.h.
 
 import warp as wp
 
+from wive.warp_kernels.lanes.layout import SIGN_BIT
 from wive.warp_kernels.lanes.precision import PRECISIONS
-from wive.warp_kernels.tree.layout import SIGN_BIT
 
 MAX_COORDINATE = 1e18
 MAX_FLOAT = 3.4028234663852886e38

@@ -5,11 +5,11 @@ from typing import Any
 
 import warp as wp
 
+from wive.warp_kernels.lanes.layout import NO_PRIM
 from wive.warp_kernels.lanes.native import LIST_HIT
 from wive.warp_kernels.lanes.precision import PRECISIONS
 from wive.warp_kernels.queries.frame import FRAMES
 from wive.warp_kernels.tree.handle import derive_struct
-from wive.warp_kernels.tree.layout import NO_PRIM
 
 
 @dataclass(frozen=True)

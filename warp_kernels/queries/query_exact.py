@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import warp as wp
 
+from wive.warp_kernels.lanes.layout import NO_PRIM
 from wive.warp_kernels.queries.frame import RayFrame
 from wive.warp_kernels.queries.query import QUERIES, Best, MultiHit, Query, list_hit
-from wive.warp_kernels.tree.layout import NO_PRIM
 
 
 @wp.struct

@@ -5,9 +5,9 @@ from types import SimpleNamespace
 import warp as wp
 
 from wive.warp_kernels.lanes.lanes import load_float, lowest_lane, without_gradient
+from wive.warp_kernels.lanes.layout import BLOCK_WIDTH, MAX_LEAF_BLOCKS, NO_PRIM
 from wive.warp_kernels.queries.query import Query
 from wive.warp_kernels.traversal.states import LEAVES
-from wive.warp_kernels.tree.layout import BLOCK_WIDTH, MAX_LEAF_BLOCKS, NO_PRIM
 
 
 def make_offer(query: Query, lanes: SimpleNamespace, triangles: SimpleNamespace, real: type) -> wp.Function:

@@ -5,9 +5,9 @@ from types import SimpleNamespace
 import warp as wp
 
 from wive.warp_kernels.lanes.lanes import without_gradient
+from wive.warp_kernels.lanes.layout import ALL_BITS, NO_PRIM, SIGN_BIT
 from wive.warp_kernels.queries.frame import is_negative
 from wive.warp_kernels.queries.query import Best64
-from wive.warp_kernels.tree.layout import ALL_BITS, NO_PRIM, SIGN_BIT
 
 ALL_BITS_64 = wp.constant(wp.uint64(0xFFFFFFFFFFFFFFFF))
 SIGN_BIT_64 = wp.constant(wp.uint64(0x8000000000000000))

@@ -10,6 +10,7 @@ from typing import Any
 import warp as wp
 
 from wive.warp_kernels.lanes.lanes import address_of, lanes_of, without_gradient
+from wive.warp_kernels.lanes.layout import ALL_BITS, END_OF_STACK, NO_PRIM, NODE_WIDTH, WORD_MASK
 from wive.warp_kernels.lanes.precision import PRECISIONS
 from wive.warp_kernels.queries.frame import FRAMES, box_tmax
 from wive.warp_kernels.queries.query_exact import query_of
@@ -19,7 +20,6 @@ from wive.warp_kernels.traversal.slabs import make_visit
 from wive.warp_kernels.traversal.states import TRAVERSALS
 from wive.warp_kernels.tree.blocks import block_form
 from wive.warp_kernels.tree.handle import CORRUPT, HANDLES
-from wive.warp_kernels.tree.layout import ALL_BITS, END_OF_STACK, NO_PRIM, NODE_WIDTH, WORD_MASK
 from wive.warp_kernels.tree.nodes import NODES
 from wive.warp_kernels.triangles import (
     triangle_exact,

@@ -11,9 +11,7 @@ from types import SimpleNamespace
 import warp as wp
 
 from wive.warp_kernels.lanes.lanes import load_float, without_gradient
-from wive.warp_kernels.lanes.native import PICK_1, PICK_4
-from wive.warp_kernels.lanes.precision import PRECISIONS
-from wive.warp_kernels.tree.layout import (
+from wive.warp_kernels.lanes.layout import (
     BLOCK_WIDTH,
     BLOCK_WORDS,
     CORNER_BITS,
@@ -24,6 +22,8 @@ from wive.warp_kernels.tree.layout import (
     USED_SHIFT,
     VERTICES_SHIFT,
 )
+from wive.warp_kernels.lanes.native import PICK_1, PICK_4
+from wive.warp_kernels.lanes.precision import PRECISIONS
 
 
 def plain_block(lanes: SimpleNamespace, precision: str) -> SimpleNamespace:

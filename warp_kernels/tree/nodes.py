@@ -4,8 +4,7 @@ from types import SimpleNamespace
 
 import warp as wp
 
-from wive.warp_kernels.lanes.native import BYTE_DISTANCES_1, BYTE_DISTANCES_8, RANKS_1, RANKS_8
-from wive.warp_kernels.tree.layout import (
+from wive.warp_kernels.lanes.layout import (
     ALL_BITS,
     CHILD_ROW,
     COMPRESSED_CHILD_ROW,
@@ -16,6 +15,7 @@ from wive.warp_kernels.tree.layout import (
     RANK_BITS,
     RANK_ROW,
 )
+from wive.warp_kernels.lanes.native import BYTE_DISTANCES_1, BYTE_DISTANCES_8, RANKS_1, RANKS_8
 
 
 @wp.func

@@ -2,7 +2,7 @@
 
 import warp as wp
 
-from wive.warp_kernels.tree.layout import (
+from wive.warp_kernels.lanes.layout import (
     COMPRESSED_NODE_WORDS,
     COMPRESSED_RANK_BITS,
     COMPRESSED_RANKS,

@@ -8,16 +8,7 @@ import warp as wp
 from numpy.typing import NDArray
 
 from wive import _cpu
-from wive.warp_kernels.tree.handle import (
-    ACCURACIES,
-    COMPRESSED,
-    CORRUPT,
-    FLOAT64,
-    HANDLES,
-    STACK_TOO_SMALL,
-    WRONG_ACCURACY,
-)
-from wive.warp_kernels.tree.layout import (
+from wive.warp_kernels.lanes.layout import (
     BLOCK_WORDS,
     CHILD_ROW,
     COMPRESSED_CHILD_ROW,
@@ -28,6 +19,15 @@ from wive.warp_kernels.tree.layout import (
     NODE_WORDS,
     UNIT_WORDS,
     WORD_MASK,
+)
+from wive.warp_kernels.tree.handle import (
+    ACCURACIES,
+    COMPRESSED,
+    CORRUPT,
+    FLOAT64,
+    HANDLES,
+    STACK_TOO_SMALL,
+    WRONG_ACCURACY,
 )
 from wive.warp_kernels.tree.quiet import set_quiet
 from wive.warp_kernels.tree.ranks import INVERT_ORDERS

@@ -11,11 +11,11 @@ from wive.warp_kernels.lanes.exact_native import (
     solve_exactly,
 )
 from wive.warp_kernels.lanes.lanes import lowest_lane, product, without_gradient
+from wive.warp_kernels.lanes.layout import NO_PRIM
 from wive.warp_kernels.lanes.precision import stack_numbers
 from wive.warp_kernels.queries.frame import RayFrame, axes_of, component
 from wive.warp_kernels.queries.query import Query
 from wive.warp_kernels.queries.query_exact import ExactBest
-from wive.warp_kernels.tree.layout import NO_PRIM
 
 # What the test keeps of a ray, in words: the longest axis, then floats: origin, the caller's direction (three
 # each) and limits, and t in the frame's units over the caller's t.
