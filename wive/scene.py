@@ -133,7 +133,7 @@ class Scene:
         Raises ValueError or TypeError, in one line naming the argument; an option that is only for other
         backends than the scene's raises ValueError.
         """
-        return self._ask(
+        return self._query(
             self._tracer.intersect, (origins, directions, tmin, tmax), threads, in_flight, lanes, stats
         )
 
@@ -158,7 +158,7 @@ class Scene:
         stats: bool = False,
     ) -> NDArray[np.bool_] | tuple[NDArray[np.bool_], Stats]:
         """(n,) bool: whether each ray hits anything with tmin <= t <= tmax; arguments as for `intersect`."""
-        return self._ask(
+        return self._query(
             self._tracer.occluded, (origins, directions, tmin, tmax), threads, in_flight, lanes, stats
         )
 
@@ -196,7 +196,7 @@ class Scene:
         Raises ValueError or TypeError, in one line naming the argument, and MemoryError if the hits don't fit
         into memory (RuntimeError on a Warp device that is full).
         """
-        return self._ask(
+        return self._query(
             self._tracer.intersect_all, (origins, directions, tmin, tmax), threads, in_flight, lanes, stats
         )
 
@@ -221,7 +221,7 @@ class Scene:
         stats: bool = False,
     ) -> NDArray[np.int32] | tuple[NDArray[np.int32], Stats]:
         """(n,) int32: how many hits `intersect_all` finds for each ray; arguments as for `intersect`."""
-        return self._ask(
+        return self._query(
             self._tracer.count, (origins, directions, tmin, tmax), threads, in_flight, lanes, stats
         )
 
@@ -322,7 +322,7 @@ class Scene:
     def _bvh(self) -> _cpu.Bvh:
         return self._tracer.bvh
 
-    def _ask(
+    def _query(
         self,
         query: Callable[[Rays, Work], tuple[Answer, Stats | None]],
         rays: tuple[ArrayLike, ArrayLike, ArrayLike, ArrayLike],

@@ -53,20 +53,20 @@ struct KernelMaker {
 
     template <KernelChoice choice, template <class> class Slabs>
     static constexpr auto kernel_with() {
-        using Asked = Query<choice.query>;
+        using QueryType = Query<choice.query>;
         constexpr bool exact_of_doubles =
             choice.accuracy == Accuracy::exact && precision_of<Real> == Precision::float64;
         if constexpr (!filter(choice) || exact_of_doubles || std::is_same_v<Slabs<Isa>, NoSlabs<Isa>>)
             return NoKernel{};
         else if constexpr (choice.accuracy == Accuracy::fast)
-            return Kernel<Slabs, FastTriangles, Asked, choice.counting>{};
+            return Kernel<Slabs, FastTriangles, QueryType, choice.counting>{};
         else if constexpr (choice.accuracy == Accuracy::watertight)
-            return Kernel<Slabs, WatertightTriangles, Asked, choice.counting>{};
+            return Kernel<Slabs, WatertightTriangles, QueryType, choice.counting>{};
         else if constexpr (choice.query == QueryKind::closest)
             return Kernel<Slabs, ExactTriangles, ExactClosestHit<typename Slabs<Isa>::Layout::Block>,
                           choice.counting>{};
         else
-            return Kernel<Slabs, ExactTriangles, Asked, choice.counting>{};
+            return Kernel<Slabs, ExactTriangles, QueryType, choice.counting>{};
     }
 
     template <KernelChoice choice>

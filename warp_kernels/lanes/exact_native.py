@@ -96,12 +96,12 @@ _SOLVE = (
 """
     + _SETUP
     + """
-    const ExactIntersection meeting(from, way, corners, ExactIntersection::unit_of(from, corners));
-    hit[3] = (perturb_edges ? meeting.hit_perturbed : meeting.hit) ? 1.0f : 0.0f;
+    const ExactIntersection exact(from, way, corners, ExactIntersection::unit_of(from, corners));
+    hit[3] = (perturb_edges ? exact.hit_perturbed : exact.hit) ? 1.0f : 0.0f;
     if (hit[3] == 0.0f) return hit;
-    hit[0] = meeting.t();
-    hit[1] = meeting.u();
-    hit[2] = meeting.v();
+    hit[0] = exact.t();
+    hit[1] = exact.u();
+    hit[2] = exact.v();
     return hit;
 """
 )
@@ -116,8 +116,8 @@ _WITHIN = (
 """
     + _SETUP
     + """
-    const ExactIntersection meeting(from, way, corners, ExactIntersection::unit_of(from, corners));
-    return !(at_tmin && meeting.compare(tmin) < 0) && !(at_tmax && meeting.compare(tmax) > 0);
+    const ExactIntersection exact(from, way, corners, ExactIntersection::unit_of(from, corners));
+    return !(at_tmin && exact.compare(tmin) < 0) && !(at_tmax && exact.compare(tmax) > 0);
 """
 )
 

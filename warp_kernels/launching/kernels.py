@@ -58,10 +58,10 @@ def make_kernel(
 
     Its arguments are the tree's handle, origins, directions, tmin, tmax and the outputs of that query.
     """
-    numbers, asked = PRECISIONS[precision], query_of(query, accuracy, precision)
+    numbers, query_type = PRECISIONS[precision], query_of(query, accuracy, precision)
     real, vec3 = numbers.real, numbers.vec3
     tree_type, frame_type = HANDLES[accuracy], FRAMES[precision]
-    found_type, result_type = asked.state, TRAVERSALS[asked.state]
+    found_type, result_type = query_type.state, TRAVERSALS[query_type.state]
     traverse = make_traversal(query, accuracy, length, stack_size, counters, nodes, precision)
     or_reduce = collectives(length).or_reduce
     load_frame = LOAD_FRAME[precision]
@@ -95,10 +95,10 @@ def make_kernel(
         numbers=wp.array(dtype=real),
         load_ray=load_ray,
         trace=trace,
-        begin=asked.begin,
+        begin=query_type.begin,
     )
     if query == "closest":
-        return _closest_kernel(parts, numbers, asked.distance, length, counters)
+        return _closest_kernel(parts, numbers, query_type.distance, length, counters)
     if query == "all":
         return _all_kernel(parts, HITS[precision])
     return (_any_kernel if query == "any" else _count_kernel)(parts, length, counters)

@@ -40,10 +40,10 @@ if TYPE_CHECKING:
 EIGHT_THREADS_BELOW = 32_768
 
 
-def choose_lanes(asked: Lanes | None, count: int, on_cuda: bool) -> Lanes:
+def choose_lanes(lanes: Lanes | None, count: int, on_cuda: bool) -> Lanes:
     """Lanes of a node per thread; None is the better choice for a batch of `count` rays."""
-    if asked is not None:
-        return asked
+    if lanes is not None:
+        return lanes
     return 1 if on_cuda and count < EIGHT_THREADS_BELOW else 8
 
 

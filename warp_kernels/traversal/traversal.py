@@ -58,9 +58,9 @@ def make_traversal(
     holds `stack_size` children, behind them their distances if the query is in order, and behind these what
     the triangle test keeps of the ray.
     """
-    asked = query_of(query, accuracy, precision)
-    in_order: bool = asked.in_order
-    first_hit_ends: bool = asked.first_hit_ends
+    query_type = query_of(query, accuracy, precision)
+    in_order: bool = query_type.in_order
+    first_hit_ends: bool = query_type.first_hit_ends
     make_triangles, ray_words = TRIANGLES[accuracy, precision]
     ray_base = stack_size * (2 if in_order else 1)
     lanes = lanes_of(length, ray_base + ray_words, precision)
@@ -69,12 +69,12 @@ def make_traversal(
     frame_type = FRAMES[precision]
     visit = make_visit(lanes, node, stack_size, in_order, frame_type)
     real = PRECISIONS[precision].real
-    offer = (make_exact_offer if accuracy == "exact" else make_offer)(asked, lanes, triangles, real)
-    test_leaf = make_leaf_test(asked, lanes, blocks, triangles.candidates, offer, real)
+    offer = (make_exact_offer if accuracy == "exact" else make_offer)(query_type, lanes, triangles, real)
+    test_leaf = make_leaf_test(query_type, lanes, blocks, triangles.candidates, offer, real)
     count_triangles = make_count(blocks)
     node_words: int = node.words
     block_words: int = blocks.least_words
-    tree_type, found_type, result_type = HANDLES[accuracy], asked.state, TRAVERSALS[asked.state]
+    tree_type, found_type, result_type = HANDLES[accuracy], query_type.state, TRAVERSALS[query_type.state]
     # Hits of a ray's threads whose t round to the same float32 number are compared once more at the end.
     compares: bool = in_order and length == 1 and (accuracy == "exact" or precision == "float64")
     keep_nearest: Any = None
