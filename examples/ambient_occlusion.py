@@ -23,7 +23,7 @@ def sky_seen(bvh: Bvh, places: wp.array(dtype=wp.vec3), sky: wp.array(dtype=floa
     """The fraction of cosine-distributed rays into the upper hemisphere that hit nothing, per place."""
     i = wp.tid()
     state = wp.rand_init(1, i)
-    free = int(0)  # noqa: RUF046, UP018
+    free = int(0)
     for _ in range(SAMPLES):
         direction = wp.sample_unit_sphere_surface(state) + wp.vec3(0.0, 0.0, 1.0)
         if not any_hit(bvh, places[i], direction, 0.0, wp.inf):

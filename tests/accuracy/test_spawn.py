@@ -175,4 +175,4 @@ def test_origins_depend_on_the_side_alone_and_cross_the_surface() -> None:
 def test_bad_directions_are_named(directions: object, error: type[Exception], text: str) -> None:
     hits = wive.Scene(*TRIANGLE).intersect(np.zeros((2, 3)), [0.1, 0.1, 1])
     with pytest.raises(error, match=f"^{re.escape(f'directions must {text}')}$"):
-        hits.spawn(directions)  # type: ignore[arg-type]
+        hits.spawn(directions)

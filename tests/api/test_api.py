@@ -157,7 +157,7 @@ def test_any_real_dtype_and_layout_gives_the_hits_of_float32(backend):
     ):
         changed = change(vertices)
         if getattr(changed, "dtype", None) == np.float64:
-            changed = vertices  # makes a float64 scene, tests/test_float64_api.py
+            changed = vertices  # makes a float64 scene, tests/api/test_float64_api.py
         scene = wive.Scene(changed, change(faces), backend=backend)
         assert_same_hits(scene.intersect(change(origins), change(directions)), expected)
 

@@ -104,7 +104,7 @@ def machine(tmp_path: Path) -> Any:
             capture_output=True, text=True, timeout=60, check=False,
         )  # fmt: skip
 
-    run.root, run.calls = root, tmp_path / "calls"  # type: ignore[attr-defined]
+    run.root, run.calls = root, tmp_path / "calls"
     return run
 
 

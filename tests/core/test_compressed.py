@@ -276,4 +276,4 @@ def test_scenes_keep_their_nodes_when_saved_and_pickled(tmp_path: Path) -> None:
 
 def test_unknown_nodes_are_refused_by_name() -> None:
     with pytest.raises(ValueError, match=r"^nodes must be one of float32, compressed"):
-        wive.Scene(*TRIANGLE, nodes="small")  # type: ignore[arg-type]
+        wive.Scene(*TRIANGLE, nodes="small")

@@ -29,4 +29,4 @@ def test_names_are_looked_up_by_the_first_query() -> None:
         with pytest.raises(ValueError, match="unknown kernel 'avx3'"):
             bvh.count(kernel, rows, rows, rows[0, :1], rows[0, :1])
     with pytest.raises((TypeError, ValueError), match="kernel"):
-        bvh.count(None, rows, rows, rows[0, :1], rows[0, :1])  # type: ignore[arg-type]
+        bvh.count(None, rows, rows, rows[0, :1], rows[0, :1])

@@ -6,10 +6,10 @@ import pytest
 
 wp = pytest.importorskip("warp")
 
-from wive.warp_kernels.lanes.precision import PRECISIONS  # noqa: E402
-from wive.warp_kernels.scene import hits as warp_hits  # noqa: E402
-from wive.warp_kernels.scene import shading as warp_shading  # noqa: E402
-from wive.warp_kernels.scene import spawn as warp_spawn  # noqa: E402
+from wive.warp_kernels.lanes.precision import PRECISIONS
+from wive.warp_kernels.scene import hits as warp_hits
+from wive.warp_kernels.scene import shading as warp_shading
+from wive.warp_kernels.scene import spawn as warp_spawn
 
 ARCHITECTURES = (80, 90, 100)
 ARITHMETIC = re.compile(r"\b(?:add|sub|mul|fma|mad|div|rcp|sqrt|rsqrt)\.[a-z0-9.]*f(?:32|64)\b")

@@ -13,7 +13,6 @@ from numpy.typing import ArrayLike, NDArray
 from wive._internal.precision import FLOAT32, FLOAT64, Floats, Real, float32_or_refused, real_of
 
 Given = ArrayLike  # what users pass, by a name short enough for overloads
-Float32 = NDArray[np.float32]
 Int32 = NDArray[np.int32]
 Lanes = Literal[1, 8]
 LanesOption = Literal["auto", 8, 1]
