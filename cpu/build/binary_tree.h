@@ -50,8 +50,8 @@ private:
     std::uint32_t bits_ = 0;
 };
 
-// An inner node over the references [begin, end), which its parent knows. Ranges of at most block_width references
-// are leaves and have no node.
+// An inner node over references [begin, end), a range that follows from its parent's. Ranges of at most block_width
+// references are leaves and have no node.
 struct alignas(16) BinaryNode {
     float lo[3];
     std::uint32_t split;  // the first reference of the right side

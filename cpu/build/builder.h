@@ -59,8 +59,8 @@ private:
     Bvh() = default;
     // Sets the bounds and the centre that follows from them.
     void set_bounds(const Bounds& bounds);
-    // Sets bounds (float32) and extent from the box of all triangles. Returns the point that planes are still to be
-    // made relative to: the centre, or zero for float64, whose boxes are relative to the centre from box_triangle on.
+    // Sets bounds (float32) and extent from the box of all triangles. Returns the point to subtract from
+    // planes: the centre, or zero for float64, whose boxes are relative to the centre from box_triangle on.
     Point finish_bounds(const Box& all);
     template <class StoredNode>
     Sah sah_of(double root) const;

@@ -5,8 +5,8 @@ namespace wive {
 void write_order(Node& node, SlotSequences sequences, int children) {
     for (int i = children; i < node_width; ++i)
         for (std::uint32_t& sequence : sequences) sequence |= static_cast<std::uint32_t>(i) << 4 * i;
-    // Eight rows of eight nibbles, transposed: first the nibbles of two octants become bytes, those of even and of odd
-    // lanes apart, then the bytes of four pairs a word.
+    // Eight rows of eight nibbles, transposed in two steps: the nibbles of two octants become bytes, even and odd lanes
+    // apart; then the bytes of four pairs become words.
     std::array<std::uint32_t, 4> even, odd;
     for (std::size_t pair = 0; pair < 4; ++pair) {
         const std::uint32_t a = sequences[2 * pair], b = sequences[2 * pair + 1];

@@ -13,8 +13,8 @@ namespace wive {
 // For each octant, slots from front to back, four bits each, the first in the lowest bits.
 struct alignas(16) SlotSequences : std::array<std::uint32_t, 8> {};
 
-// The sequence of a single slot, and of two treelets of which the ray meets `left` first where it is positive on
-// the axis. left_count: how many slots the left treelet has.
+// The sequence of a single slot; and of two treelets, of which the ray meets `left` first if its direction is positive
+// on the axis. left_count: how many slots the left treelet has.
 constexpr SlotSequences single_slot(std::uint32_t slot) {
     SlotSequences s{};
     s.fill(slot);

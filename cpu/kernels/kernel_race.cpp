@@ -17,7 +17,7 @@ namespace {
 constexpr std::uint32_t sheets = 4, cells = 50;  // two triangles per cell
 constexpr std::size_t ray_count = 1024;
 constexpr int turns = 3, passes = 3;
-// Times closer than this are a tie, in which the holder stays, so that every run of a program uses the same form.
+// Times closer than this count as equal, and the holder is kept, so that every run of a program uses the same form.
 constexpr double clear_lead = 0.98;
 
 // Rough horizontal sheets in the unit cube, and rays from random points in all directions.

@@ -56,7 +56,7 @@ struct KernelTable {
 template <class Real>
 std::optional<KernelTable<Real>> join(std::string_view name, std::initializer_list<const KernelTable<Real>*> parts);
 
-// Null if this build has no such kernels; whether the machine can run them is dispatch.h's business.
+// Null if this build has no such kernels. dispatch.h tells whether this machine can run them.
 const KernelTable<float>* avx512_full_kernels();
 const KernelTable<float>* avx512_half_kernels();
 const KernelTable<float>* avx2_kernels();

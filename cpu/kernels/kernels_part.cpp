@@ -16,7 +16,7 @@ namespace wive {
 namespace WIVE_ISA {
 
 template <class Isa>
-struct HalfSlabs;  // of AVX-512 alone
+struct HalfSlabs;  // defined for AVX-512 only
 
 namespace {
 

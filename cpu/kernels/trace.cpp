@@ -9,7 +9,7 @@
 namespace wive {
 namespace {
 
-// Rays that a thread takes at a time: enough to make taking them free, few enough to balance the threads.
+// Rays that a thread takes at a time: enough that taking them costs nothing, few enough to balance the threads.
 constexpr std::size_t rays_per_run = 1024;
 // Rays in flight if the caller leaves the choice, measured by `python -m bench inflight`.
 constexpr unsigned usual_in_flight = 24;

@@ -1,4 +1,4 @@
-// Points, normals, error bounds and spawned origins of hits, each computed at the call that asks for them.
+// Points, normals, error bounds and spawned origins of hits, computed anew by each call.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -111,7 +111,7 @@ py::array_t<double> normals(const Array<Real>& vertices, const Array<std::int32_
     return answer;
 }
 
-// Ray-plane intersection points in double, whatever the tree's precision; for grazing rays, where that is
+// Ray-plane intersection points in double, whatever the tree's precision. For grazing rays, whose intersection is
 // ill-conditioned, the point at u and v instead.
 template <class Real>
 py::array_t<double> points_on_rays(const Array<double>& vertices, const Array<std::int32_t>& faces,

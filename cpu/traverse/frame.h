@@ -23,12 +23,12 @@ namespace wive::WIVE_ISA {
 // distance to a plane is computed as fma(p, r, bias), r = 1/d and bias = -o r -+ slack, where, in the roundoff
 // u = 2^-24, P the tree's extent and O = |o| on that axis, the errors add up, as lengths along the axis, to
 //     2u(P + O)  from r and from o r,      u(2P + 2O)  from rounding bias and result,
-//     u O        from o = origin - centre, u P         where there is no fused multiply-add,
+//     u O        from o = origin - centre, u P         if there is no fused multiply-add,
 // and the triangle test (triangle_watertight.h) moves a vertex sideways by at most 6u max(P + O). All of it is
 // below 12u M, M = max over the axes of (P + O); slack = |r| 16u M covers it. The near distance is lowered and the far
 // distance raised by it, so no box that holds a triangle the test accepts is ever missed.
 // Compressed planes (compressed_slabs.h) are met at fma(byte, step r, fma(origin, r, bias)). step r is exact, the step
-// being a power of two far from underflow; rounding the inner sum adds u(P + O), and the product of the byte 2u P where
+// being a power of two far from underflow; rounding the inner sum adds u(P + O), and the product of the byte 2u P if
 // there is no fused multiply-add. Such planes may lie up to a step outside, which is below P / 60: 15u M in all.
 // A float64 ray meets the same boxes, all of this in float: its direction is rounded, which adds u(P + O) from r; o =
 // origin - centre is taken in double, so that its one rounding to float is the u O above. The triangle tests move

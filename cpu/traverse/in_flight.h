@@ -143,10 +143,9 @@ private:
         assert_queues_fit();
     }
 
-    // Tests one block per flight: the rest of its leaf stays on top of the stack, so that the next block is prefetched
-    // and the loop over the flights never waits for a leaf. First find() runs on all blocks; then solve() on the few
-    // blocks with a possible hit, without a branch on whether there is one; then their flights are enqueued, whose
-    // intervals are known only now.
+    // Tests one block per flight. The rest of its leaf stays on top of the stack, so that the next block is prefetched
+    // and tested a round later. First find() runs on all blocks; then solve() on the few blocks with a possible hit,
+    // without a branch on whether there is one; then their flights are enqueued, whose intervals are known only now.
     [[gnu::always_inline]] void test_leaves() {
         const BvhView bvh = bvh_;
         State** const last = ends_.leaf;

@@ -227,7 +227,7 @@ class Packets {
 public:
     static constexpr bool bit_exact = OnePacket::bit_exact;
 
-    // With fewer rays in flight than a packet has, there are none.
+    // None if fewer rays are in flight than a packet has.
     Packets(const BvhView& bvh, const auto& rays, const auto& hits, unsigned in_flight)
         : next_try_(in_flight < OnePacket::packet_size ? std::numeric_limits<std::size_t>::max() : 0),
           packet_(bvh, rays, hits) {}

@@ -169,7 +169,7 @@ struct AvxPick {
 };
 
 // The child in the last lane that was hit; at least one must be. Read back from memory, to which the children are
-// stored before the boxes are decided, so that only the lane number has to be waited for.
+// stored before the boxes are decided: only the lane number depends on the boxes.
 WIVE_INLINE std::uint32_t last_hit_child(__m256i children, __m256 hits) {
     alignas(32) std::uint32_t lanes[8];
     _mm256_store_si256(reinterpret_cast<__m256i*>(lanes), children);

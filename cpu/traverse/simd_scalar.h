@@ -140,7 +140,7 @@ struct ScalarLanes {
     WIVE_INLINE static ScalarLanes of(const ScalarLanes<float, width>& a) { return narrow(a); }
 };
 
-// Which of eight lanes were hit. As AvxHits.
+// Which of eight lanes were hit (HitLanes in concepts.h).
 struct ScalarHits {
     unsigned mask;
     WIVE_INLINE unsigned bits() const { return mask; }
@@ -182,7 +182,7 @@ struct Scalar {
         WIVE_INLINE unsigned slot(int i) const { return slots[i]; }
     };
 
-    // As AvxPick.
+    // Chooses four of the eight floats at an address, by four bits each of `word` from bit `shift` on.
     struct Pick {
         std::uint32_t index;
         WIVE_INLINE Pick(std::uint32_t word, int shift) : index(word >> shift) {}
@@ -193,7 +193,7 @@ struct Scalar {
 
     using Hits = ScalarHits;
 
-    // As Avx512::Lanes.
+    // Children and distances of one node (CompressedChildren in concepts.h).
     template <bool in_order>
     struct Lanes {
         Hits by_slot;
