@@ -32,7 +32,7 @@ USUAL = (
 )  # fmt: skip
 QUICK_SCENES = ("terrain_10k", "terrain_40k")
 QUICK_EFFORT = Effort(least=2, most=2)
-# Large meshes get fewer rounds: about so many triangles are built per side.
+# Large meshes get fewer rounds, so that each side builds about this many triangles.
 TRIANGLES_BUILT = 10_000_000
 FEWEST_ROUNDS, MOST_ROUNDS = 3, 15
 LARGEST_HIGH = 4_000_000  # triangles; "high" quality takes several times as long to build

@@ -1,6 +1,6 @@
 """Single rays against native Embree 4 on the very same arrays: speed, build time, SAH cost, memory.
 
-Ours with one thread and as many rays in flight as asked (1: plain single-ray traversal; tuned: what a batch
+wive with one thread and a given number of rays in flight (1: plain single-ray traversal; tuned: what a batch
 gets), against a loop over rtcIntersect1 or rtcOccluded1; float32 and compressed nodes; fast against
 Embree's default, watertight against its robust flag; each kernel against Embree held to the same
 instruction set. A ratio above 1 means that wive is faster. `mismatches` counts rays that only one side

@@ -139,7 +139,7 @@ def speed_rows(mesh: Mesh, trees: Trees, sets: Sequence[Rays], effort: Effort) -
 def closest(
     tree: _cpu.Bvh, kernel: str, rays: Rays, in_flight: int = 0, stats: bool = False
 ) -> tuple[NDArray[np.float32], NDArray[np.int32], NDArray[np.float32], NDArray[np.int32] | None]:
-    """t, prim, uv and, if asked for, steps, on one thread."""
+    """t, prim, uv and, if `stats`, steps, on one thread."""
     if kernel in SORTING:
         return order_study.intersect(kernel, tree, *rays.arrays, in_flight=in_flight, stats=stats)
     return tree.intersect(kernel, *rays.arrays, threads=1, in_flight=in_flight, stats=stats)

@@ -23,7 +23,7 @@ ACCURACIES = ("fast", "watertight")
 
 CPU = Path(__file__).parents[2] / "cpu"
 STUDY = Path(__file__).parents[1] / "native" / "study"
-# As CMakeLists.txt has them for these kernels.
+# The flags of these kernels in CMakeLists.txt.
 FLAGS = ["-std=c++20", "-shared", "-fPIC", "-DNDEBUG", "-ffp-contract=off", "-fno-math-errno", "-pthread"]
 AVX512 = ["-mavx2", "-mfma", "-mbmi", "-mbmi2", "-mlzcnt", "-mpopcnt"]
 AVX512 += ["-mavx512f", "-mavx512vl", "-mavx512dq", "-mavx512bw"]
@@ -38,7 +38,7 @@ def tree(
     """A float32 tree whose nodes have this child order."""
     bvh = _cpu.Bvh(vertices, faces, accuracy)
     if order != "treelet":
-        nodes = bvh.nodes  # read-only for everyone else; nobody else has this tree yet
+        nodes = bvh.nodes  # read-only, but nothing else refers to this tree yet
         number = STORED_ORDERS.index(order) - 1
         _orders().study_write_order(
             ctypes.c_void_p(nodes.ctypes.data), ctypes.c_size_t(len(nodes)), ctypes.c_int(number)

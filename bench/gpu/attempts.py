@@ -67,7 +67,7 @@ def hard_case(vertices: NDArray[np.float32], faces: NDArray[np.int32], device: s
 
 
 def compared(found: dict[str, Any], right: dict[str, Any]) -> Wrong:
-    """Of the answers found, those with wrong numbers."""
+    """The answers found that have wrong numbers."""
     counts = {key: differing(value, right[key]) for key, value in found.items()}
     return {key: count for key, count in counts.items() if count}
 
@@ -246,12 +246,12 @@ def own_kernel(case: Case, **options: Any) -> Wrong:
 
 
 def own_fast_math_kernel(case: Case) -> Wrong:
-    """As `own_kernel`, with fast_math, which may change bits."""
+    """`own_kernel` with fast_math, which may change bits."""
     return own_kernel(case, fast_math=True)
 
 
 def torch_side_stream(case: Case) -> Wrong:
-    """As `torch_tensors`, on a stream beside the default one."""
+    """`torch_tensors` on a stream beside the default one."""
     return torch_tensors(case, on_side_stream=True)
 
 

@@ -31,7 +31,7 @@ LEAST_SECONDS = 20.0  # left of the budget when a section may still begin
 
 
 def main(options: Sequence[str]) -> None:
-    """Runs the sections asked for."""
+    """Runs the sections selected."""
     chosen = parse_options(options)
     wp.config.log_level = wp.LOG_WARNING
     folder = SceneFolder(chosen.scene_dir)

@@ -136,7 +136,7 @@ def test_exact_rays_in_a_triangles_plane_miss_it_whatever_the_plane(cpu: str, no
         directions = r[:, :1] * (b - a) + r[:, 1:] * (c - a)
         mesh = np.stack([a, b, c]), np.int32([[0, 1, 2]])
         assert not scene_of(mesh, cpu, "exact", nodes).occluded(origins, directions).any()
-        # From a hair beside the plane, at a place inside, they do not.
+        # A ray from above the plane, along the normal to the middle, hits.
         normal = np.cross(b - a, c - a)
         above = (a + b + c) + 3 * normal, -normal
         assert scene_of((3 * mesh[0], mesh[1]), cpu, "exact", nodes).occluded(*above).all()

@@ -1,4 +1,4 @@
-"""Folders include and import one way: python -> render -> kernels -> build, traverse -> core; Warp's, too."""
+"""Folders include one way: python -> render -> kernels -> build, traverse -> core; warp_kernels likewise."""
 
 import ast
 import re

@@ -4,7 +4,7 @@ import numpy as np
 
 
 class Foreign:
-    """A library that speaks DLPack and nothing else, over NumPy's memory."""
+    """A library that supports DLPack and nothing else, over NumPy's memory."""
 
     __name__ = "foreign.api"
 

@@ -56,7 +56,7 @@ def ways_out(hits: wive.Hits, incoming: np.ndarray, flattest: float = 1e-9) -> n
     slopes = 10 ** random.uniform(np.log10(flattest), -2, (3, len(normals), 1)) * random.choice(
         [-1, 1], (3, len(normals), 1)
     )
-    # and along the edges, where the direction is in the plane as precisely as its dtype allows
+    # and along the edges, for which the direction is in the plane as precisely as its dtype allows
     corners = hits.vertices[hits.faces[np.maximum(hits.prim, 0)]].astype(np.float64)
     edges = (corners - np.roll(corners, 1, axis=1)).swapaxes(0, 1)
     edges /= abs(edges).max(axis=-1, keepdims=True)

@@ -57,7 +57,7 @@ REGISTERS = {
     ("exact", 8): 128,
     ("exact", 1): 112,
 }
-# With compressed nodes: unpacking takes a few.
+# Compressed nodes need a few more, for unpacking.
 COMPRESSED_REGISTERS = {
     ("fast", 8): 96,
     ("watertight", 8): 112,
@@ -73,7 +73,7 @@ DOUBLE_REGISTERS = {
     ("fast", 1): 120,
     ("watertight", 1): 104,
 }
-# Bytes: a thread that owns its stack holds a child and, for the closest hit, a distance an entry, and up to
+# Bytes: a thread that owns its stack holds a child and, for the closest hit, a distance per entry, and up to
 # eleven words of the ray behind them. A group's stack is in shared memory.
 STACK_BYTES = {
     "closest": STACK * 8 + 48,
@@ -82,7 +82,7 @@ STACK_BYTES = {
     "all": STACK * 4 + 48,
 }
 DOUBLE_STACK_BYTES = 32  # more: rays are kept in double
-EXACT_STACK_BYTES = 9 * 1024  # the integers of the rare cases: two triangles' where hits are compared
+EXACT_STACK_BYTES = 9 * 1024  # integers of the exact test, of two triangles if hits are compared
 
 
 def stack_limit(query: str, accuracy: str, lanes: int) -> int:
@@ -101,7 +101,7 @@ class Usage:
 
 
 def compiled_ptx(module: wp.Module, architecture: int, folder: Path) -> str:
-    """The PTX of a module, as NVRTC wrote it. Raises where CUDA code does not compile."""
+    """The PTX of a module, as NVRTC wrote it. Raises if CUDA code does not compile."""
     wp.compile_aot_module(module, arch=architecture, module_dir=str(folder), use_ptx=True)
     (path,) = folder.glob(f"*.sm{architecture}.ptx")
     return path.read_text().rstrip("\0")
@@ -120,7 +120,7 @@ def find_ptxas() -> Iterator[Path]:
 
 
 def assemble(ptx: str, architecture: int, folder: Path) -> Usage:
-    """Assemble PTX and read what ptxas says of its kernel; skip where no ptxas here knows its version."""
+    """Assemble PTX and read what ptxas says of its kernel; skips if no ptxas here knows its version."""
     source = folder / "kernel.ptx"
     source.write_text(ptx)
     tried = []

@@ -43,7 +43,7 @@ def test_hard_rays_give_the_bits_of_the_core_in_every_form(accuracy: str, nodes:
     for vertices, faces in (HARD[name] for name in (HARD if nodes == "float32" else HARDEST)):
         bvh = _cpu.Bvh(vertices, faces, accuracy, nodes=nodes)
         given = hard_rays(vertices, faces) if len(faces) else [*map(np.float64, random_rays(50, 8))]
-        tmin = np.full(1, -np.inf)  # behind the origin, too: t of either sign
+        tmin = np.full(1, -np.inf)  # also behind the origin: t of either sign
         for lanes, step in ((8, 1), (1, 5)):  # fibers are slow
             rays = *(np.ascontiguousarray(rows[::step]) for rows in given), tmin
             reference = cpu_answers(bvh, "scalar", *rays)

@@ -25,7 +25,7 @@ def scenes() -> tuple[wive.Scene, wive.Scene]:
 
 
 def as_rows(array: Any) -> np.ndarray:
-    """Of Warp, torch, or a library that speaks DLPack and nothing else."""
+    """An array of Warp, torch, or a library that supports only DLPack, as NumPy's."""
     return array.values if isinstance(array, Foreign.Array) else array.numpy()
 
 

@@ -94,7 +94,7 @@ def test_hard_rays_give_the_same_bits_in_every_form(mesh: str, accuracy: str, no
     vertices, faces = HARD_MESHES[mesh]()
     bvh = _cpu.Bvh(vertices, faces, accuracy, nodes=nodes)
     origins, directions = hard_rays(vertices, faces) if len(faces) else random_rays(50, 8)
-    tmin = np.full(1, -np.inf, np.float32)  # behind the origin, too: t of either sign
+    tmin = np.full(1, -np.inf, np.float32)  # also behind the origin: t of either sign
     reference = cpu_answers(bvh, "scalar", origins, directions, tmin)
     for lanes in (8, 1):
         assert_bit_identical(warp_answers(bvh, lanes, origins, directions, tmin), reference)
