@@ -18,7 +18,7 @@ from wive.scene import Scene
 Image = NDArray[np.float32]
 
 ALBEDOS = ("gray", "normals")
-# Paths per band: some tenths of a second, so that the bar moves; Ctrl-C is answered between bands.
+# Paths per band: some tenths of a second, so that the bar moves; Ctrl-C takes effect between bands.
 BAND_PATHS = 300_000
 CUDA_BAND_PATHS = 1 << 20
 LARGEST_SIDE = 65_536

@@ -234,9 +234,9 @@ class Scene:
         more steps with every refit, and a new `Scene` is worth its price. Triangles that lose their area are
         no longer hit; if one that had none gains some, the tree is built anew, and so are compressed trees.
 
-        Queries that run in other threads meanwhile finish on the old positions. So does a tree for
-        `wive.warp_kernels` that was taken from `tree` before: take it again. Of two refits at once the one
-        that ends last counts.
+        Queries that run in other threads meanwhile finish on the old positions. A tree that was taken from
+        `tree` before, for `wive.warp_kernels`, keeps them: take it again. Of two refits at once the one that
+        ends last counts.
 
         Arguments:
             vertices: (v,3) real numbers, as many as before, used in the scene's precision. A C-contiguous

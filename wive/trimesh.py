@@ -101,8 +101,9 @@ class RayMeshIntersector:
             max_hits: the most hits per ray; None is all there are. (trimesh stops at 100.)
             return_locations: whether to return the points hit.
 
-        Returns (m,) int64 rows of `mesh.faces`, (m,) int64 rays, and (m,3) float64 points if asked for. As in
-        trimesh, all first hits precede all second ones, and so on, each by ascending ray.
+        Returns (m,) int64 rows of `mesh.faces`, (m,) int64 rays, and (m,3) float64 points if
+        `return_locations`. As in trimesh, all first hits precede all second ones, and so on, each by
+        ascending ray.
         """
         origins, directions = _rays(ray_origins, ray_directions)
         placed = self._place()

@@ -61,8 +61,8 @@ def make_differentiable_hit(accuracy: str, differentiable_hit: wp.Function | Non
 
         `vertices` and `faces` are the mesh that the tree was built over. The traversal finds the triangle and
         has no gradient; t and the point are then computed from the triangle in float, so t may differ from
-        `closest_hit`'s in its last digits. Gradients are those of the triangle that is hit: a ray that slips
-        off an edge is not seen by them. It takes the same handles as `closest_hit`.
+        `closest_hit`'s in its last digits. Gradients are those of the triangle that is hit; they do not
+        include the jump of t when a ray moves past an edge. It takes the same handles as `closest_hit`.
         """
         hit = closest_hit(bvh, origin, direction, tmin, tmax)
         return on_surface(hit.prim, vertices, faces, origin, direction)

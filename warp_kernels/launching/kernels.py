@@ -1,7 +1,6 @@
-"""The kernels over batches of rays, specialised on what is asked.
+"""The kernels over batches of rays.
 
-There is one kernel per query, accuracy, lane form, stack size, node form and precision, with and without
-counters.
+One kernel per query, accuracy, lane form, stack size, node form and precision, with and without counters.
 """
 
 import functools

@@ -1,6 +1,6 @@
 """A ray made ready for traversal: checked, scaled, with reciprocals and slab offsets.
 
-Operation by operation as cpu/traverse/frame.h.
+The operations are those of cpu/traverse/frame.h, in the same order.
 """
 
 import warp as wp

@@ -35,7 +35,7 @@ from wive.warp_kernels.scene.rays import RayLoader, WarpRays
 if TYPE_CHECKING:
     from wive.rendering import Image, Settings
 
-# For fewer rays eight threads per ray keep a GPU busy and answer sooner; for more, one thread per ray traces
+# For fewer rays eight threads per ray keep a GPU busy and return sooner; for more, one thread per ray traces
 # more rays per second. The two are equal at this size on an H200, docs/warp.md.
 EIGHT_THREADS_BELOW = 32_768
 

@@ -45,7 +45,7 @@ def make_visit(
         top: int,
     ):
         """Store at `top` the children hit within [tmin, tmax], the nearest last; return their number."""
-        # (A) order: octant 7 - o is octant o backwards, and the stack wants the farthest child first.
+        # (A) order: octant 7 - o is octant o backwards, and the stack needs the farthest child first.
         shift = wp.uint32(rank_bits * (7 - ray.octant))
         ranks = load_ranks(units, node, lane)
         children = load_row(units, node + child_row, lane)

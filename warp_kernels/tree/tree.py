@@ -77,7 +77,7 @@ def upload(bvh: _cpu.Bvh, device: wp.DeviceLike = None) -> Tree:
     """Copy the tree to a Warp device ("cpu", "cuda:0", ...; None is Warp's current device).
 
     The copy differs in one row of each node: `order`, which says which child comes i-th, is turned into the
-    rank of each child, so that a lane knows its place without reading another lane.
+    rank of each child, so that a lane finds its place without reading another lane.
     """
     set_quiet()
     place = wp.get_device(device)

@@ -1,6 +1,6 @@
 """The fast triangle test: Moeller and Trumbore 1997.
 
-Operation by operation as cpu/traverse/triangle_fast.h.
+The operations are those of cpu/traverse/triangle_fast.h, in the same order.
 """
 
 from types import SimpleNamespace

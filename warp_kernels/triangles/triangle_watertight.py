@@ -1,6 +1,6 @@
 """The watertight test: Woop, Benthin and Wald 2013.
 
-Operation by operation as cpu/traverse/triangle_watertight.h.
+The operations are those of cpu/traverse/triangle_watertight.h, in the same order.
 """
 
 from types import SimpleNamespace

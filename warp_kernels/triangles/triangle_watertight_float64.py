@@ -1,6 +1,7 @@
 """The watertight test in float64 trees: Woop, Benthin and Wald 2013 on blocks of doubles.
 
-Operation by operation as cpu/traverse/triangle_watertight.h and triangle_watertight_float64.h.
+The operations are those of cpu/traverse/triangle_watertight.h and triangle_watertight_float64.h, in the same
+order.
 """
 
 from types import SimpleNamespace
@@ -26,7 +27,7 @@ SMALLEST_SHEAR = wp.constant(wp.float64(2.0**-100))
 
 @wp.func_native(EXACT_WEIGHT)
 def exact_weight(x1: wp.float64, y1: wp.float64, x2: wp.float64, y2: wp.float64) -> wp.float64:
-    """x1 y2 - y1 x2 with the exact sign, and zero only where it is zero."""
+    """x1 y2 - y1 x2 with the exact sign, and zero only if it is exactly zero."""
     ...
 
 

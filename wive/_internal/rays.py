@@ -1,4 +1,4 @@
-"""The rays of one query: which libraries' arrays they are, and whether they lie where the scene traces."""
+"""The rays of one query: the library of each array, and the check that all are on the scene's device."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def check_rays(
     backend: str,
     device: str | None,
 ) -> Rays:
-    """The rays, if they are arrays of one library that lie where the scene traces.
+    """The rays, if they are arrays of one library on the scene's device.
 
     Numbers and vectors of shape (3,) may always be NumPy's. Raises TypeError or ValueError otherwise.
     """

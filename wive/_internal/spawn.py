@@ -23,7 +23,7 @@ ACCURACIES = ("fast", "watertight", "exact")  # as SpawnOrigin numbers them
 class Rounding(NamedTuple):
     """Rounding errors of the triangle tests and of spawning: members of SpawnOrigin, in its order."""
 
-    # Where a triangle's point is, and where its unit normal points, as computed in double.
+    # Errors of a point on a triangle and of its unit normal, both computed in double.
     point: float
     normal: float
     # The watertight test: rounding moves a corner, and its depth, by at most 7u of its distance along each
