@@ -138,8 +138,8 @@ void check_mesh(const Mesh<Real>& mesh, Threads& threads) {
     if (const std::size_t i = first_bad(mesh.face_count, threads, bad_faces, bad_face); i < mesh.face_count) {
         const std::int32_t* f = mesh.faces + 3 * i;
         std::ostringstream text;
-        text << "faces[" << i << "] = (" << f[0] << ", " << f[1] << ", " << f[2] << "): expected indices in 0.."
-             << static_cast<long long>(mesh.vertex_count) - 1 << ", there are " << mesh.vertex_count << " vertices";
+        text << "faces must index the " << mesh.vertex_count << " vertices from 0, got [" << f[0] << ", " << f[1]
+             << ", " << f[2] << "] in face " << i;
         throw std::invalid_argument(text.str());
     }
 }

@@ -135,7 +135,7 @@ def test_a_picture_of_a_mesh_that_was_changed_after_the_build_is_refused():
     vertices, faces = sphere(2)
     scene = wive.Scene(vertices, faces)
     faces[7, 1] = len(vertices)
-    with pytest.raises(ValueError, match=r"faces\[7\]"):
+    with pytest.raises(ValueError, match=r"^faces must index the .* in face 7$"):
         wive.render(scene, **SMALL)
 
 

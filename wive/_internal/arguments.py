@@ -111,7 +111,9 @@ def mesh(vertices: ArrayLike, faces: ArrayLike, accuracy: str = "watertight") ->
         raise ValueError(
             f"faces must have shape (f, 3), one row of three vertex indices per triangle, got {corners.shape}"
         )
-    if corners.size and (corners.min() < 0 or corners.max() >= len(points)):
+    fits = np.can_cast(corners.dtype, np.int32)
+    # The core refuses indices out of range in the same words, but those beyond int32 would wrap on the way.
+    if not fits and corners.size and (corners.min() < -MOST_COUNT - 1 or corners.max() > MOST_COUNT):
         face = int(np.argmax(((corners < 0) | (corners >= len(points))).any(axis=1)))
         raise ValueError(
             f"faces must index the {len(points)} vertices from 0, got {corners[face].tolist()} in face {face}"
