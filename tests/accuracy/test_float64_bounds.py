@@ -1,7 +1,6 @@
 """`Hits.error_bound` and `Hits.spawn` hold in float64, in which they are computed themselves."""
 
 from collections.abc import Callable
-from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -12,9 +11,7 @@ from support.error_bounds import (
     Set,
     aimed,
     broken,
-    crossed,
     exact_t,
-    fractions,
     random_triangles,
     traced,
 )
@@ -23,6 +20,7 @@ from support.spawned_rays import (
     EXPONENTS,
     SLIVERS,
     TRANSLATED,
+    assert_origins_on_the_side,
     hits_of,
     leave,
     own_hits,
@@ -159,13 +157,7 @@ def test_origins_lie_strictly_on_the_side_of_the_direction(
     shape: tuple[float, float, float], accuracy: str
 ) -> None:
     _, hits, incoming = hits_of(triangles(*shape), accuracy, dtype=np.float64)
-    found = np.flatnonzero(hits.mask)
-    v0, v1, v2 = fractions(hits.vertices[hits.faces[hits.prim[found]]]).swapaxes(0, 1)
-    normal = crossed(v1 - v0, v2 - v0)
-    for directions in ways_out(hits, incoming)[:3]:
-        above = (normal * (fractions(hits.spawn(directions)[found]) - v0)).sum(axis=1)
-        forward = (normal * fractions(directions[found])).sum(axis=1)
-        assert all(a * f > Fraction(0) for a, f in zip(above, forward, strict=True))
+    assert_origins_on_the_side(hits, ways_out(hits, incoming)[:3])
 
 
 @pytest.mark.parametrize("accuracy", ACCURACIES)

@@ -1,17 +1,16 @@
 """Rays from `Hits.spawn` don't hit the triangle they leave: any size, place, side and direction."""
 
 import re
-from fractions import Fraction
 
 import numpy as np
 import pytest
-from support.error_bounds import crossed, fractions
 from support.meshes import TRIANGLE, sphere
 from support.spawned_rays import (
     COUNT,
     EXPONENTS,
     SLIVERS,
     TRANSLATED,
+    assert_origins_on_the_side,
     hits_of,
     leave,
     own_hits,
@@ -66,13 +65,7 @@ def test_origins_lie_strictly_on_the_side_of_the_direction(
     shape: tuple[float, float, float], accuracy: str
 ) -> None:
     _, hits, incoming = hits_of(triangles(*shape), accuracy)
-    found = np.flatnonzero(hits.mask)
-    v0, v1, v2 = fractions(hits.vertices[hits.faces[hits.prim[found]]]).swapaxes(0, 1)
-    normal = crossed(v1 - v0, v2 - v0)
-    for directions in ways_out(hits, incoming)[:5]:
-        above = (normal * (fractions(hits.spawn(directions)[found]) - v0)).sum(axis=1)
-        forward = (normal * fractions(directions[found])).sum(axis=1)
-        assert all(a * f > Fraction(0) for a, f in zip(above, forward, strict=True))
+    assert_origins_on_the_side(hits, ways_out(hits, incoming)[:5])
 
 
 @pytest.mark.parametrize("accuracy", ACCURACIES)

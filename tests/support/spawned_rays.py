@@ -1,11 +1,12 @@
 """Triangles of any size and place, hits in them, and rays spawned from these hits."""
 
 from collections.abc import Callable
+from fractions import Fraction
 
 import numpy as np
 
 import wive
-from support.error_bounds import aimed
+from support.error_bounds import aimed, crossed, fractions
 
 COUNT = 200
 # Magnitude of coordinates, size of triangles, and how far off the middle of an edge the third corner is.
@@ -77,6 +78,17 @@ def own_hits(
         again = scene.intersect_all((spawn or hits.spawn)(directions), directions)
         count += np.count_nonzero(again.prim == hits.prim[again.ray])
     return count
+
+
+def assert_origins_on_the_side(hits: wive.Hits, ways: np.ndarray) -> None:
+    """Spawned origins lie, exactly and strictly, on the side of the plane to which each direction leads."""
+    found = np.flatnonzero(hits.mask)
+    v0, v1, v2 = fractions(hits.vertices[hits.faces[hits.prim[found]]]).swapaxes(0, 1)
+    normal = crossed(v1 - v0, v2 - v0)
+    for directions in ways:
+        above = (normal * (fractions(hits.spawn(directions)[found]) - v0)).sum(axis=1)
+        forward = (normal * fractions(directions[found])).sum(axis=1)
+        assert all(a * f > Fraction(0) for a, f in zip(above, forward, strict=True))
 
 
 def leave(scene: wive.Scene, origin: np.ndarray, seed: int) -> tuple[np.ndarray, np.ndarray]:
