@@ -7,8 +7,8 @@ from typing import NoReturn
 
 import wive
 from wive._internal import commands
+from wive._internal.picture import ALBEDOS, Settings
 from wive.backend import CPU_BACKENDS, WARP
-from wive.rendering import ALBEDOS, Settings
 
 BAD_INPUT = 2
 INTERRUPTED = 130

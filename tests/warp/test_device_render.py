@@ -56,7 +56,8 @@ def test_bands_and_passes_change_no_bit(both, monkeypatch):
 
 
 def test_as_many_rays_are_traced_as_on_the_cpu(both):
-    from wive.rendering import Settings, render_counted
+    from wive._internal.picture import Settings
+    from wive.rendering import render_counted
 
     settings = Settings(width=50, height=30, spp=3)
     rays = [render_counted(scene, None, settings, progress=False)[1] for scene in both]

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from wive.rendering import Image, Settings
+from wive._internal.picture import Image, Settings
 from wive.warp_kernels import check, launch_closest
 from wive.warp_kernels.scene import shading as warp_shading
 from wive.warp_kernels.scene.tracer import WarpTracer, choose_lanes

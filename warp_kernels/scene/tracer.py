@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import warp as wp
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from wive import _cpu
 from wive._internal.arguments import Lanes, Work
 from wive._internal.arrays import NUMPY
+from wive._internal.picture import Image, Settings
 from wive._internal.precision import Floats
 from wive._internal.rays import Rays
 from wive._internal.wrapping import Wrapping
@@ -31,9 +32,6 @@ from wive.warp_kernels import (
 from wive.warp_kernels.lanes.precision import PRECISIONS
 from wive.warp_kernels.scene.hits import WarpAllHits, WarpHits
 from wive.warp_kernels.scene.rays import RayLoader, WarpRays
-
-if TYPE_CHECKING:
-    from wive.rendering import Image, Settings
 
 # For fewer rays eight threads per ray keep a GPU busy and return sooner; for more, one thread per ray traces
 # more rays per second. The two are equal at this size on an H200, docs/warp.md.

@@ -12,6 +12,7 @@ from wive._internal.arguments import rays as checked_rays
 from wive._internal.arguments import refuse_lacking
 from wive._internal.files import atomic_write, check_output
 from wive._internal.npzfile import check_input, read_npy_or_npz
+from wive._internal.picture import Settings
 from wive._internal.precision import Floats, Real, real_named
 from wive._internal.progress import progress_bar
 from wive._internal.terrain import terrain_camera, terrain_mesh
@@ -20,7 +21,7 @@ from wive.backend import Backend, backends
 from wive.camera import Camera
 from wive.hits import Hits
 from wive.meshfile import load_mesh
-from wive.rendering import Settings, check_png_output, render_counted, write_png
+from wive.rendering import check_png_output, render_counted, write_png
 from wive.scene import Scene
 
 # Rays per step of the progress bar.

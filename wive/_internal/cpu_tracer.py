@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import Any, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,14 +12,12 @@ from wive import _cpu
 from wive._internal import arguments
 from wive._internal.arguments import Work
 from wive._internal.arrays import NUMPY
+from wive._internal.picture import Image, Settings
 from wive._internal.precision import Floats, real_of
 from wive._internal.rays import Rays
 from wive._internal.wrapping import Wrapping
 from wive.all_hits import AllHits, WrappedAllHits
 from wive.hits import Hits, Stats, WrappedHits, stats_of
-
-if TYPE_CHECKING:
-    from wive.rendering import Image, Settings
 
 
 class CpuTracer:

@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from wive import _cpu
 from wive._internal.arguments import Work
+from wive._internal.picture import Image, Settings
 from wive._internal.precision import Floats
 from wive._internal.rays import Rays
 
 if TYPE_CHECKING:
     from wive.all_hits import AllHits
     from wive.hits import Hits, Stats
-    from wive.rendering import Image, Settings
     from wive.warp_kernels import Tree
 
 
