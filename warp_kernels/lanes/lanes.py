@@ -27,7 +27,6 @@ from wive.warp_kernels.lanes.native import (
     ROW_1,
     ROW_8,
     SYNC,
-    TRIANGLES_1,
     TRIANGLES_4,
     shared_stack_code,
 )
@@ -139,7 +138,7 @@ def lanes_of(length: int, stack_words: int, precision: str) -> SimpleNamespace:
     """
     eight = length == 8
     triangles_length = 4 if eight else 1
-    c_type, rounded = {"float32": ("float", "__fmul_rn"), "float64": ("double", "__dmul_rn")}[precision]
+    rounded = "__fmul_rn" if precision == "float32" else "__dmul_rn"
     vector = wp.types.vector(length=length, dtype=wp.float32)
     words = wp.types.vector(length=length, dtype=wp.uint32)
     triangles = wp.types.vector(length=triangles_length, dtype=getattr(wp, precision))
@@ -152,10 +151,18 @@ def lanes_of(length: int, stack_words: int, precision: str) -> SimpleNamespace:
     @wp.func_native(ROW_8 if eight else ROW_1)
     def load_row(units: wp.uint64, at: int, lane: int) -> words: ...
 
-    wide_load = TRIANGLES_4 if precision == "float32" else DOUBLE_TRIANGLES_4
+    if eight:
 
-    @wp.func_native(wide_load if eight else TRIANGLES_1.replace("TYPE", c_type).replace("REAL", precision))
-    def load_triangles(units: wp.uint64, at: int, lane: int) -> triangles: ...
+        @wp.func_native(TRIANGLES_4 if precision == "float32" else DOUBLE_TRIANGLES_4)
+        def load_triangles(units: wp.uint64, at: int, lane: int) -> triangles: ...
+    else:
+        # Native code here makes NVRTC peel the loop over a leaf's blocks: six registers more on sm_100.
+        load_number = load_float if precision == "float32" else load_double
+        number_words: int = 1 if precision == "float32" else 2
+
+        @wp.func
+        def load_triangles(units: wp.uint64, at: int, lane: int):
+            return triangles(load_number(units, at + number_words * (lane & 3)))
 
     @wp.func_native(
         PRODUCTS.replace("LENGTH", str(triangles_length))

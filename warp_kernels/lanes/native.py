@@ -219,15 +219,6 @@ TRIANGLES_4 = """
     return wp::vec_t<4, wp::float32>(row[0], row[1], row[2], row[3]);
 #endif
 """
-TRIANGLES_1 = """
-    const TYPE* number = (const TYPE*)((const float*)units + at) + (lane & 3);
-#if defined(__CUDA_ARCH__)
-    return wp::vec_t<1, wp::REAL>(__ldg(number));
-#else
-    return wp::vec_t<1, wp::REAL>(*number);
-#endif
-"""
-
 DOUBLE_TRIANGLES_4 = """
     const double* row = (const double*)((const float*)units + at);
 #if defined(__CUDA_ARCH__)
