@@ -158,9 +158,14 @@ def test_pickles_and_copies_give_the_same_hits():
 
 def test_backend_and_accuracy_are_those_requested(backend):
     mesh, _ = own(*sphere(2))
-    ours = wive.trimesh.RayMeshIntersector(mesh, backend=backend, accuracy="fast", threads=1)
+    rays = random_rays(50, seed=5, low=-0.3, high=0.3)
+    options = {"backend": backend, "accuracy": "fast"}
+    ours = wive.trimesh.RayMeshIntersector(mesh, **options, threads=None if backend == "warp" else 1)
     assert (ours.scene.backend, ours.scene.accuracy) == (backend, "fast")
-    assert (ours.intersects_first(*random_rays(50, seed=5, low=-0.3, high=0.3)) >= 0).all()
+    assert (ours.intersects_first(*rays) >= 0).all()
+    if backend == "warp":
+        with pytest.raises(ValueError, match="threads is only for CPU backends"):
+            wive.trimesh.RayMeshIntersector(mesh, **options, threads=1).intersects_first(*rays)
 
 
 def test_invalid_rays_and_meshes_without_faces_hit_nothing():
