@@ -10,7 +10,7 @@
 # `run` again, without pieces, runs the bench with other options.
 set -eu
 
-work=${WIVE_GPU_WORK:-/tmp/wive-gpu}
+work=${WIVE_GPU_WORK:-${TMPDIR:-/tmp}/wive-gpu}
 longest_wait=${WIVE_GPU_WAIT:-300} # seconds
 python=${PYTHON:-python3}
 
