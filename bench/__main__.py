@@ -14,6 +14,7 @@ BENCHES = {
     "latency": "seconds per call over batch sizes: every backend, wp.mesh_query_ray, embreex",
     "order": "steps per ray for five orders of visiting a node's children, and their speed",
     "paper": "the WiVe paper's tables: path tracing with its traversals and with Embree's",
+    "packets": "pictures from near and far with packets, over the same without",
     "pareto": "speed against leaks, wrong triangles and the error of t, with Embree and Warp",
     "python": "embreex, trimesh, Warp and wive from Python, NumPy arrays in and out",
     "quality": 'what quality="high" saves in steps per ray and costs in build time',

@@ -65,9 +65,10 @@ concept HitLanes = requires(const H hits, const std::uint32_t* row, std::uint32_
 
 // Eight floats: one per child of a node, or one per ray of half a packet.
 template <class V, class Hits>
-concept EightFloats = requires(V a, V b, V c, const float* from, const std::uint8_t* bytes, float x) {
+concept EightFloats = requires(V a, V b, V c, const float* from, float* to, const std::uint8_t* bytes, float x) {
     { V::load(from) } -> std::same_as<V>;          // from memory aligned to 32 bytes
     { V::load(bytes) } -> std::same_as<V>;         // eight bytes as floats
+    a.store(to);                                   // to memory aligned to 32 bytes
     { V::all(x) } -> std::same_as<V>;              // the same number in every lane
     { a * b } -> std::same_as<V>;                  // product
     { multiply_add(a, b, c) } -> std::same_as<V>;  // a * b + c, fused or not: the slack in frame.h allows for either

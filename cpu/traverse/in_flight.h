@@ -80,9 +80,13 @@ private:
     };
 
     // Starts the next ray that can hit anything, in the given flight; writes misses for the rays before it.
-    void start_next_ray(State& f) {
+    [[gnu::noinline]] void start_next_ray(State& f) {
         for (;; ++next_) {
             do {
+                if (packets_.has_split_rays()) [[unlikely]] {
+                    resume_split_ray(f);
+                    return;
+                }
                 if (next_ == end_ && !source_.take(next_, end_)) {
                     end_ = next_;
                     return;
@@ -100,6 +104,13 @@ private:
         f.top = Stack::Top(f.stack);
         f.top.child() = inner_child(0);  // the root
         *ends_.node++ = &f;
+    }
+
+    [[gnu::noinline]] void resume_split_ray(State& f) {
+        packets_.take_split_ray(f);
+        QueueEnds ends = ends_;
+        enqueue(bvh_, f, true, true, ends);
+        ends_ = ends;
     }
 
     // Pops entries that lie behind the best hit (may_skip is false for the rest of a leaf, which is never skipped),

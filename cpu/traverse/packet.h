@@ -5,6 +5,11 @@
 // and each of them is tested as a single ray is. If boxes lie within their parents' boxes, a ray that meets a leaf's
 // box meets all boxes above it: every ray is tested against the same leaves in the same order as in single-ray
 // traversal, and its hits are the same bits.
+//
+// Rays that lie farther apart than the boxes are large share only the upper nodes. So the rays that meet a child's box
+// are counted before it is visited, which bounds what a packet can lose: when its steps cost more than the steps of
+// single rays that they stand in for, the packet is split, and its rays are traced on in flight, each with the entries
+// of the packet's stack that it meets.
 #pragma once
 
 #include <cassert>
@@ -46,18 +51,56 @@ public:
     // Traces rays [first, first + packet_size) and writes their hits, or refuses to if they are not coherent.
     [[gnu::noinline]] Outcome trace(std::size_t first) {
         if (!are_coherent(first, packet_size - 1) || !are_coherent(first, 1) || !load(first)) return Outcome::refused;
+        first_ = first;
+        entry_count_ = 0;
+        split_rays_ = 0;
         walk_packet();
-        for (unsigned i = 0; i < packet_size; ++i) query_[i].write(hits_, first + i, ray_[i].scale);
-        return rays_at_leaves_ >= worthwhile_rays_per_leaf * leaves_ ? Outcome::worthwhile : Outcome::not_worthwhile;
+        for (unsigned i = 0; i < packet_size; ++i)
+            if ((split_rays_ >> i & 1u) == 0) query_[i].write(hits_, first + i, ray_[i].scale);
+        return single_steps_ * worthwhile_ratio.den >= packet_steps_ * worthwhile_ratio.num ? Outcome::worthwhile
+                                                                                            : Outcome::not_worthwhile;
+    }
+
+    // Rays of a split packet that are not finished.
+    bool has_split_rays() const { return split_rays_ != 0; }
+
+    // Moves one of them to a flight, with the entries of the packet's stack that it meets.
+    [[gnu::noinline]] void take_split_ray(auto& flight) {
+        const auto i = static_cast<unsigned>(__builtin_ctz(split_rays_));
+        split_rays_ &= split_rays_ - 1;
+        flight.ray = ray_[i];
+        new (&flight.query) Query(query_[i]);
+        flight.index = first_ + i;
+        flight.top = Stack::Top(flight.stack);
+        flight.top.move(-1);
+        for (const Entry* entry = entries_; entry != entries_ + entry_count_; ++entry)
+            if ((entry->rays >> i & 1u) != 0) {
+                flight.top.move(1);
+                flight.top.child() = entry->child;
+                flight.top.distance() = entry->tnear[i];
+            }
     }
 
 private:
-    // Rays that meet the box of a leaf the packet visits, on average; with fewer, rays in flight are faster.
-    static constexpr unsigned worthwhile_rays_per_leaf = 2;
+    // Costs in steps of single rays in flight, measured by `python -m bench packets`: of starting a packet, of a step
+    // at a node, at a leaf and at a box that no ray meets, of splitting a packet, and of each entry of its stack then.
+    static constexpr int start_cost = 4, node_cost = 3, leaf_cost = 3, skip_cost = 2, split_cost = 64, entry_cost = 3;
+    // A packet is split when it has lost this many steps since it had saved most.
+    static constexpr int most_lost_steps = 24;
+    // Single rays' steps per step of a packet from which on the next rays are traced as a packet too.
+    static constexpr struct {
+        int num, den;
+    } worthwhile_ratio = {3, 2};
 
     // The largest difference between the rays' directions, relative to their longest component, and between their
     // origins, relative to the tree's extent.
     static constexpr float max_turn = 1.0f / 8, max_shift = 1.0f / 16;
+
+    // An entry of the stack of a split packet: the rays that meet the child's box, and where.
+    struct Entry {
+        alignas(64) float tnear[packet_size];
+        std::uint32_t child, rays;
+    };
 
     // A ray that may hit some of a block's triangles.
     struct Candidate {
@@ -136,32 +179,64 @@ private:
     }
 
     [[gnu::noinline]] void walk_packet() {
-        leaves_ = rays_at_leaves_ = 0;
+        packet_steps_ = start_cost + node_cost;  // the root, which is visited for all rays
+        single_steps_ = packet_size;
+        int most_saved = 0;
         float box_tmax = farthest_tmax();
         // A leaf's box is in its parent, so each entry of the stack has its parent beside it, at the same index.
         const auto parent_at = [&](const Stack::Top& top) { return parents_ + (&top.distance() - stack_.distances); };
         walk<Query::in_order, I>(
             bvh_, PacketSlabs<I, Layout>(bounds_), stack_, [&] { return box_tmax; },
             [&](std::uint32_t child, const Stack::Top& top) {
+                if (child != inner_child(0)) {
+                    const int rays = __builtin_popcount(rays_meeting_box(*parent_at(top), child));
+                    count_step(rays, rays == 0 ? skip_cost : node_cost);
+                    const int saved = single_steps_ - packet_steps_;
+                    if (saved < most_saved - most_lost_steps) {
+                        split(child, &top.distance() - stack_.distances);
+                        return Walk::end;
+                    }
+                    most_saved = saved > most_saved ? saved : most_saved;
+                    if (rays == 0) return Walk::skip;
+                }
                 for (int i = 0; i < node_width; ++i) parent_at(top)[i] = child;
+                return Walk::visit;
             },
             [&](std::uint32_t child, const Stack::Top& top) {
-                const Node& parent = bvh_.template node<Layout>(*parent_at(top));
-                unsigned rays = rays_meeting_box(parent, I::Hits::of_child(parent.child, child).first());
-                ++leaves_;
-                rays_at_leaves_ += static_cast<unsigned>(__builtin_popcount(rays));
+                unsigned rays = rays_meeting_box(*parent_at(top), child);
+                count_step(__builtin_popcount(rays), leaf_cost);
                 const Block* block = bvh_.template leaf<Layout>(child);
                 bool found = false;
                 for (std::uint32_t count = leaf_block_count(child); rays != 0 && count > 0;
                      --count, block = block->next())
                     found |= test_block(*block, rays);
                 if (found) box_tmax = farthest_tmax();
-                return box_tmax == finished;
+                return box_tmax == finished ? Walk::end : Walk::visit;
             });
     }
 
-    // The mask of the rays that meet the box in a lane of a node.
-    [[gnu::always_inline]] unsigned rays_meeting_box(const Node& node, unsigned lane) const {
+    [[gnu::always_inline]] void count_step(int rays, int cost) {
+        packet_steps_ += cost;
+        single_steps_ += rays;
+    }
+
+    // Keeps what is left to do: `child`, whose place on the stack is `top`, and the entries below it.
+    [[gnu::noinline]] void split(std::uint32_t child, std::ptrdiff_t top) {
+        for (std::ptrdiff_t i = Stack::sentinels; i <= top; ++i) {
+            Entry& entry = entries_[entry_count_];
+            entry.child = i == top ? child : stack_.children[i];
+            entry.rays = rays_meeting_box(parents_[i], entry.child, entry.tnear);
+            entry_count_ += entry.rays != 0;
+            split_rays_ |= entry.rays;
+        }
+        packet_steps_ += split_cost + entry_cost * static_cast<int>(entry_count_);
+    }
+
+    // The mask of the rays that meet the box of a node's child, and where they enter it.
+    [[gnu::always_inline]] unsigned rays_meeting_box(std::uint32_t parent, std::uint32_t of_child,
+                                                     float* tnear = nullptr) const {
+        const Node& node = bvh_.template node<Layout>(parent);
+        const unsigned lane = I::Hits::of_child(node.child, of_child).first();
         assert(lane < node_width);
         const OneChild<Float8> child{lane};
         unsigned rays = 0;
@@ -174,6 +249,7 @@ private:
                 [&](unsigned axis) { return distance(bounds_.far_row[axis], axis, far_bias_[axis]); },
                 Float8::load(tmin_ + i), Float8::load(tmax_ + i));
             rays |= boxes.hit.bits() << i;
+            if (tnear) boxes.tnear.store(tnear + i);
         }
         return rays;
     }
@@ -211,12 +287,16 @@ private:
     alignas(64) float rdir_[3][packet_size],
         near_bias_[3][packet_size], far_bias_[3][packet_size], tmin_[packet_size], tmax_[packet_size];
     PacketBounds bounds_;
-    unsigned leaves_ = 0, rays_at_leaves_ = 0;
+    std::size_t first_ = 0;  // ray of the packet
+    int packet_steps_ = 0, single_steps_ = 0;
+    unsigned split_rays_ = 0;  // mask of rays not yet taken
+    std::size_t entry_count_ = 0;
     Frame ray_[packet_size];
     Query query_[packet_size];
     Candidate candidates_[packet_size + 1];
     Stack stack_;
     std::uint32_t parents_[Stack::size];
+    Entry entries_[Stack::size];
 };
 
 // Decides which rays of a thread are traced in packets.
@@ -249,6 +329,9 @@ public:
         return traced;
     }
 
+    [[gnu::always_inline]] bool has_split_rays() const { return packet_.has_split_rays(); }
+    void take_split_ray(auto& flight) { packet_.take_split_ray(flight); }
+
 private:
     static constexpr std::size_t longest_pause = 496;  // 16, 48, 112, 240, 496
 
@@ -259,6 +342,8 @@ private:
 struct NoPackets {
     [[gnu::always_inline]] NoPackets(const BvhView&, const auto&, const auto&, unsigned) {}
     [[gnu::always_inline]] static bool trace_next(std::size_t, std::size_t) { return false; }
+    static constexpr bool has_split_rays() { return false; }
+    static void take_split_ray(auto&) {}
 };
 
 }  // namespace wive::WIVE_ISA

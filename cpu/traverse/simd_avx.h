@@ -126,6 +126,7 @@ struct AvxFloat8 {
         return {_mm256_cvtepi32_ps(_mm256_cvtepu8_epi32(_mm_loadl_epi64(reinterpret_cast<const __m128i*>(p))))};
     }
     WIVE_INLINE static AvxFloat8 all(float x) { return {_mm256_set1_ps(x)}; }
+    WIVE_INLINE void store(float* p) const { _mm256_store_ps(p, v); }
     WIVE_INLINE friend AvxFloat8 operator*(AvxFloat8 a, AvxFloat8 b) { return {_mm256_mul_ps(a.v, b.v)}; }
     WIVE_INLINE friend AvxFloat8 multiply_add(AvxFloat8 a, AvxFloat8 b, AvxFloat8 c) {
         return {_mm256_fmadd_ps(a.v, b.v, c.v)};

@@ -39,8 +39,11 @@ template <bool in_order, Isa I, SlabTest<I> Slabs>
 [[gnu::always_inline]] inline std::uint32_t visit_and_pop(const BvhView& bvh, const typename Slabs::Node& node,
                                                           const Slabs& slabs, float tmax, Stack::Top& top);
 
+// What a walk does next.
+enum class Walk { visit, skip, end };
+
 // Walks the tree from the root, for one ray or for a packet. box_tmax(): the distance up to which hits still count.
-// at_node(child, top) is called before an inner node is visited. at_leaf(child, top) returns true to end the walk.
+// at_node(child, top) tells what to do at an inner node, at_leaf(child, top) at a leaf after testing it: visit goes on.
 template <bool in_order, Isa I, SlabTest<I> Slabs>
 [[gnu::always_inline]] inline void walk(const BvhView& bvh, const Slabs& slabs, Stack& stack, const auto& box_tmax,
                                         const auto& at_node, const auto& at_leaf);
@@ -135,11 +138,15 @@ template <bool in_order, Isa I, SlabTest<I> Slabs>
     };
     for (;;) {
         while (is_inner(child)) {
-            at_node(child, top);
-            child = visit_and_pop<in_order, I>(bvh, bvh.template node<Layout>(child), slabs, box_tmax(), top);
+            const Walk next = at_node(child, top);
+            if (next == Walk::end) return;
+            if (next == Walk::visit)
+                child = visit_and_pop<in_order, I>(bvh, bvh.template node<Layout>(child), slabs, box_tmax(), top);
+            else
+                pop();
             pop_hidden();
         }
-        if (child == end_of_stack || at_leaf(child, top)) return;
+        if (child == end_of_stack || at_leaf(child, top) == Walk::end) return;
         pop();
         pop_hidden();
         prefetch<Layout>(bvh, top.child(-2));
@@ -157,12 +164,16 @@ template <Isa I, template <class> class Slabs, template <class> class Triangles,
     Stack stack;
     walk<Query::in_order, I>(
         bvh, Slabs<I>(ray), stack, [&] { return query.interval.box_tmax(); },
-        [&](std::uint32_t, const Stack::Top&) { counters.inner_node(); },
+        [&](std::uint32_t, const Stack::Top&) {
+            counters.inner_node();
+            return Walk::visit;
+        },
         [&](std::uint32_t child, const Stack::Top&) {
             counters.leaf();
             const Triangles<I> triangles(ray);  // made here: while nodes are visited, they need the registers
-            return test_leaf<Corners>(bvh.template leaf<Layout>(child), leaf_block_count(child), triangles, query,
-                                      counters);
+            const bool done = test_leaf<Corners>(bvh.template leaf<Layout>(child), leaf_block_count(child), triangles,
+                                                 query, counters);
+            return done ? Walk::end : Walk::visit;
         });
     result = query;
 }

@@ -77,6 +77,12 @@ def test_bench_inflight_counts_steps_and_measures_memory(bench: Callable[..., di
     assert all(row["steps"] > 1 for row in content["rows"])
 
 
+def test_bench_packets_measures_every_view(bench: Callable[..., dict[str, Any]]) -> None:
+    content = bench("packets", "--scenes", SCENE, "--widths", "16,64")
+    assert len(content["rows"]) == 5 * 2 * 2  # distances, widths, queries
+    assert all(row["ratio"] > 0 and row["ray_ns"] > 0 for row in content["rows"])
+
+
 def test_bench_build_counts_bytes(bench: Callable[..., dict[str, Any]]) -> None:
     content = bench("build", "--scenes", SCENE, "--threads", "1", "--quality", "medium")
     assert [row["threads"] for row in content["build"]] == [1]

@@ -46,6 +46,16 @@ def picture(mesh: tuple[np.ndarray, np.ndarray], unit: bool) -> Batch:
     return batch(mesh, np.broadcast_to(eye, directions.shape), directions)
 
 
+def telescope(mesh: tuple[np.ndarray, np.ndarray]) -> Batch:
+    """A camera's rays from far away, row by row, so far apart that neighbours share only the upper nodes."""
+    low, high = mesh[0].min(axis=0).astype(np.float64), mesh[0].max(axis=0).astype(np.float64)
+    middle, size = (low + high) / 2, (high - low).max()
+    y, x = np.meshgrid(np.linspace(-0.6, 0.6, 70), np.linspace(-0.6, 0.6, 70), indexing="ij")
+    targets = middle + np.stack([x, np.zeros_like(x), y], axis=-1).reshape(-1, 3) * size
+    eye = middle - np.array([3, 20, 40]) * size
+    return batch(mesh, np.broadcast_to(eye, targets.shape), targets - eye)
+
+
 def scan(mesh: tuple[np.ndarray, np.ndarray], direction: tuple[float, float, float]) -> Batch:
     """Parallel rays from a plane above the mesh, row by row; some of their limits are empty."""
     low, high = mesh[0].min(axis=0).astype(np.float64), mesh[0].max(axis=0).astype(np.float64)
@@ -89,6 +99,8 @@ BATCHES: dict[str, Callable[[], Batch]] = {
     "picture": partial(picture, soup(1500, 1), unit=True),
     "picture, directions of any length": partial(picture, soup(1500, 2, size=0.05), unit=False),
     "picture far away": partial(picture, placed(sphere(4), 1000.0, (148376, 1234, -223423)), unit=True),
+    "telescope": partial(telescope, sphere(6)),
+    "telescope, long triangles": partial(telescope, soup(3000, 8)),
     "tiny picture": partial(picture, placed(soup(1500, 3), 1e-6, (0, 0, 0)), unit=True),
     "scan straight down": partial(scan, soup(1500, 4), (0.0, -0.0, -1.0)),
     "slanted scan": partial(scan, soup(1500, 4), (0.4, 0.3, -1.5)),
