@@ -1,64 +1,118 @@
-"""Meshes from files: npz files of two arrays, and whatever trimesh reads."""
+"""Meshes from files: a reader is chosen by the file's kind, and what it returns is checked once for all of them."""
 
 from __future__ import annotations
 
 import os
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from wive._internal.files import PathLike
-from wive._internal.npzfile import check_input, read_npz
-from wive._internal.precision import real_named
+from wive._internal.formats import Mesh
+from wive._internal.formats.kinds import kind_of
+from wive._internal.npzfile import check_input
+from wive._internal.precision import Floats, Real, real_named
+
+# Vertices and triangles are numbered by int32.
+MOST = 2**31 - 1
+
+
+class Readable(Protocol):
+    """A file object: an open file or io.BytesIO."""
+
+    def read(self) -> bytes | str:
+        """Everything from where it stands to its end."""
+
+
+MeshSource = PathLike | bytes | bytearray | memoryview | Readable
 
 
 def load_mesh(
-    path: PathLike, dtype: DTypeLike = np.float32
-) -> tuple[NDArray[np.floating[Any]], NDArray[np.integer[Any]]]:
+    source: MeshSource, dtype: DTypeLike = np.float32, *, file_type: str | None = None
+) -> tuple[Floats, NDArray[np.int32]]:
     """Vertices (v,3) and faces (f,3) of a mesh file, in the file's own order, nothing merged or dropped.
 
-    An .npz file gives its arrays `vertices` and `faces`. Any other file is read by trimesh; the meshes of a
-    file that holds a scene are placed and joined.
+    Triangle i is the file's i-th; a polygon of n corners is n - 2 triangles at its place. docs/mesh_files.md lists the
+    formats, what is kept of them and what is refused.
 
     Arguments:
+        source: a path, or the file's content: bytes or a file object, which is read to its end.
         dtype: of the vertices, np.float32 or np.float64. Few files hold more than float32; those of survey
             coordinates do, and a float64 `Scene` keeps it.
+        file_type: the format, such as "ply", in place of the extension. Content without a name shows its
+            format by its first bytes if this is None.
 
-    Raises OSError if the file can't be read, ValueError if it is no mesh or has no triangles, ImportError if
-    trimesh is missing. Each message is one line that names the file.
+    Raises OSError if the file can't be read, ValueError if it is no mesh, is damaged or has no triangles,
+    ImportError if its format needs a package that is missing. Each message is one line that names the file.
     """
     real = real_named(dtype)
-    name = check_input(path)
-    if name.lower().endswith(".npz"):
-        arrays = read_npz(name, "an npz file of arrays `vertices` and `faces`")
-        if not {"vertices", "faces"} <= arrays.keys():
-            found = ", ".join(sorted(arrays)) or "none"
-            raise ValueError(f"{name}: expected arrays `vertices` and `faces`, found {found}")
-        vertices, faces = arrays["vertices"], arrays["faces"]
-    else:
-        vertices, faces = _load_with_trimesh(name)
+    name, folder, data = _content(source)
+    kind = kind_of(data, name, file_type)
+    if not data:
+        raise ValueError(f"{name}: is empty")
+    return _checked(_read(kind, data, name, folder, real), name, real)
+
+
+def _content(source: MeshSource) -> tuple[str, str | None, bytes]:
+    """Name for errors, folder if the file has one, content."""
+    if isinstance(source, str | os.PathLike):
+        name = check_input(source)
+        with open(name, "rb") as file:
+            return name, os.path.dirname(os.path.abspath(name)), file.read()
+    if isinstance(source, bytes | bytearray | memoryview):
+        return "mesh (bytes)", None, bytes(source)
+    if not callable(getattr(source, "read", None)):
+        raise TypeError(f"source must be a path, bytes or a file object, got {type(source).__name__}")
+    named = getattr(source, "name", None)  # a number if the file was opened by its descriptor
+    name = named if isinstance(named, str) and named else "mesh (file object)"
+    data = source.read()
+    if isinstance(data, str):
+        data = data.encode()
+    if not isinstance(data, bytes | bytearray | memoryview):
+        raise TypeError(f"source.read() must return bytes, got {type(data).__name__}")
+    return name, None, bytes(data)
+
+
+def _read(kind: str, data: bytes, name: str, folder: str | None, real: Real) -> Mesh:
+    """Import the reader of this kind and run it."""
+    if kind == "npz":
+        from wive._internal.formats import npz
+
+        return npz.read(data, name)
+    from wive._internal.formats import by_trimesh
+
+    return by_trimesh.read(data, name, kind)
+
+
+def _checked(mesh: Mesh, name: str, real: Real) -> tuple[Floats, NDArray[np.int32]]:
+    """The mesh in the dtypes of a scene; ValueError unless it is one."""
+    vertices, faces = mesh
+    for what, array, kinds in (("vertices", vertices, "iuf"), ("faces", faces, "iu")):
+        if array.dtype.kind not in kinds:
+            numbers = "real numbers" if what == "vertices" else "integers"
+            raise ValueError(f"{name}: {what} must be {numbers}, got dtype {array.dtype}")
+        if array.size and (array.ndim != 2 or array.shape[1] != 3):
+            raise ValueError(f"{name}: {what} must have three columns, got shape {array.shape}")
+        if len(array) > MOST:
+            raise ValueError(f"{name}: has {len(array):,} {what}, more than {MOST:,}: split the file")
     if faces.size == 0:
         raise ValueError(f"{name}: has no triangles")
-    is_real = vertices.dtype.kind in "fiu"  # a Scene refuses other dtypes
-    return real.array(vertices) if is_real else vertices, faces
-
-
-def _load_with_trimesh(name: str) -> tuple[NDArray[Any], NDArray[Any]]:
-    try:
-        import trimesh
-    except ImportError:
-        raise ImportError(
-            f'{name}: reading mesh files needs trimesh: pip install "wive[trimesh]", or pass an .npz file'
-        ) from None
-    if os.path.getsize(name) == 0:
-        raise ValueError(f"{name}: is empty")
-    try:
-        mesh = trimesh.load(name, force="mesh", process=False)
-    except Exception as error:  # what loaders raise on bad bytes differs by format
-        reason = " ".join(str(error).split()) or type(error).__name__
-        hint = '; try pip install "trimesh[easy]"' if isinstance(error, ImportError) else ""
-        raise ValueError(f"{name}: not a mesh that trimesh can read ({reason:.120}{hint})") from error
-    if not isinstance(mesh, trimesh.Trimesh):
-        raise ValueError(f"{name}: holds no triangle mesh but a {type(mesh).__name__}")
-    return np.asarray(mesh.vertices), np.asarray(mesh.faces, dtype=np.int32)
+    wrong = (faces < 0) | (faces >= len(vertices))
+    if wrong.any():
+        row = int(np.argmax(wrong.any(axis=1)))
+        raise ValueError(
+            f"{name}: triangle {row} must index the {len(vertices)} vertices from 0, got {faces[row].tolist()}"
+        )
+    points = real.array(vertices)
+    faces = np.ascontiguousarray(faces, dtype=np.int32)
+    finite = np.isfinite(points).all(axis=1)
+    if not finite.all():  # vertices that no triangle uses may be anything
+        bad = ~finite[faces]
+        if bad.any():
+            row = int(np.argmax(bad.any(axis=1)))
+            vertex = int(faces[row][bad[row]][0])
+            found = np.asarray(vertices[vertex]).tolist()
+            mend = ": load it with dtype=np.float64" if np.isfinite(vertices[vertex]).all() else ""
+            raise ValueError(f"{name}: vertex {vertex} of triangle {row} must be finite {real.name} numbers, got {found}{mend}")
+    return points, faces

@@ -1,0 +1,13 @@
+"""Readers of mesh files, one module per format; `wive.meshfile` chooses one and checks what it returns.
+
+A reader is `read(data, name)`: the file's bytes and its name for errors. It returns vertices (v,3) and triangles (f,3)
+in the file's own order, nothing merged or dropped, and raises ValueError, in one line that says which file, which
+place in it, what was expected, what was found and how to mend it. Readers of text also take the dtype of the vertices,
+so that each number is rounded once; glTF's takes the folder of the files that it names.
+"""
+
+from typing import Any
+
+from numpy.typing import NDArray
+
+Mesh = tuple[NDArray[Any], NDArray[Any]]

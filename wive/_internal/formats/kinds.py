@@ -1,0 +1,57 @@
+"""Which format a file has: by its name, or by its first bytes."""
+
+from __future__ import annotations
+
+import io
+import os
+import re
+import zipfile
+
+OBJ_LINE = re.compile(rb"^[ \t]*(?:v|f)[ \t]+[-+.\d]", re.MULTILINE)
+OFF_WORD = re.compile(rb"(?:ST)?C?N?4?n?OFF\b|OFF\d")
+SNIFFED = 1 << 16
+
+
+def kind_of(data: bytes, name: str, file_type: str | None) -> str:
+    """The extension, without its dot, that stands for the format; ValueError if nothing tells it."""
+    if file_type is not None:
+        if not isinstance(file_type, str) or not file_type.strip(". "):
+            raise ValueError(f"file_type must be a format such as 'ply', got {file_type!r:.60}")
+        return file_type.strip().lower().rpartition(".")[2]
+    kind = os.path.splitext(name)[1].lower().lstrip(".")
+    kind = kind or _by_content(data)
+    if not kind and data:
+        raise ValueError(f"{name}: nothing tells its format: pass file_type, such as 'ply'")
+    return kind
+
+
+def _by_content(data: bytes) -> str:
+    """The format that the first bytes show, "" if none."""
+    head = data[:SNIFFED].lstrip(b"\xef\xbb\xbf \t\r\n")
+    if re.match(rb"ply\s", head):
+        return "ply"
+    if head.startswith(b"glTF"):
+        return "glb"
+    if head.startswith(b"PK"):
+        return _by_members(data)
+    if head.startswith(b"{") and b'"asset"' in data:
+        return "gltf"
+    if OFF_WORD.match(head):
+        return "off"
+    if is_binary_stl(data) or head[:5].lower() == b"solid":
+        return "stl"
+    return "obj" if OBJ_LINE.search(head) else ""
+
+
+def _by_members(data: bytes) -> str:
+    try:
+        with zipfile.ZipFile(io.BytesIO(data)) as archive:
+            names = archive.namelist()
+    except (zipfile.BadZipFile, OSError, ValueError, NotImplementedError):
+        return "npz"
+    return "3mf" if any(name.lower().endswith(".model") for name in names) else "npz"
+
+
+def is_binary_stl(data: bytes) -> bool:
+    """Whether the length is that of a binary STL file with the number of facets in its header."""
+    return len(data) >= 84 and len(data) == 84 + 50 * int.from_bytes(data[80:84], "little")
