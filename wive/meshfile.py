@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
@@ -114,5 +114,7 @@ def _checked(mesh: Mesh, name: str, real: Real) -> tuple[Floats, NDArray[np.int3
             vertex = int(faces[row][bad[row]][0])
             found = np.asarray(vertices[vertex]).tolist()
             mend = ": load it with dtype=np.float64" if np.isfinite(vertices[vertex]).all() else ""
-            raise ValueError(f"{name}: vertex {vertex} of triangle {row} must be finite {real.name} numbers, got {found}{mend}")
+            raise ValueError(
+                f"{name}: vertex {vertex} of triangle {row} must be finite {real.name} numbers, got {found}{mend}"
+            )
     return points, faces
