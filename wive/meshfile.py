@@ -1,9 +1,11 @@
-"""Meshes from files: a reader is chosen by the file's kind, and what it returns is checked once for all of them."""
+"""Meshes from files: the reader is chosen by the file's kind, what it returns is checked once for all."""
 
 from __future__ import annotations
 
 import os
-from typing import Protocol
+from collections.abc import Callable
+from importlib import import_module
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
@@ -14,6 +16,8 @@ from wive._internal.formats.kinds import kind_of
 from wive._internal.npzfile import check_input
 from wive._internal.precision import Floats, Real, real_named
 
+# Readers of formats that may be text.
+TEXT = ("obj", "off", "ply", "stl")
 # Vertices and triangles are numbered by int32.
 MOST = 2**31 - 1
 
@@ -33,8 +37,8 @@ def load_mesh(
 ) -> tuple[Floats, NDArray[np.int32]]:
     """Vertices (v,3) and faces (f,3) of a mesh file, in the file's own order, nothing merged or dropped.
 
-    Triangle i is the file's i-th; a polygon of n corners is n - 2 triangles at its place. docs/mesh_files.md lists the
-    formats, what is kept of them and what is refused.
+    Triangle i is the file's i-th; a polygon of n corners is n - 2 triangles at its place. docs/mesh_files.md
+    lists the formats, what is kept of them and what is refused.
 
     Arguments:
         source: a path, or the file's content: bytes or a file object, which is read to its end.
@@ -80,6 +84,10 @@ def _read(kind: str, data: bytes, name: str, folder: str | None, real: Real) -> 
         from wive._internal.formats import npz
 
         return npz.read(data, name)
+    if kind in TEXT:
+        reader = import_module(f"wive._internal.formats.{kind}")
+        read: Callable[[bytes, str, np.dtype[Any]], Mesh] = reader.read
+        return read(data, name, real.dtype)
     from wive._internal.formats import by_trimesh
 
     return by_trimesh.read(data, name, kind)
@@ -98,23 +106,22 @@ def _checked(mesh: Mesh, name: str, real: Real) -> tuple[Floats, NDArray[np.int3
             raise ValueError(f"{name}: has {len(array):,} {what}, more than {MOST:,}: split the file")
     if faces.size == 0:
         raise ValueError(f"{name}: has no triangles")
-    wrong = (faces < 0) | (faces >= len(vertices))
+    wrong = ((faces < 0) | (faces >= len(vertices))).any(axis=1)
     if wrong.any():
-        row = int(np.argmax(wrong.any(axis=1)))
+        row = int(np.argmax(wrong))
         raise ValueError(
-            f"{name}: triangle {row} must index the {len(vertices)} vertices from 0, got {faces[row].tolist()}"
+            f"{name}: triangle {row} must index the {len(vertices)} vertices from 0, "
+            f"got {faces[row].tolist()}"
         )
     points = real.array(vertices)
     faces = np.ascontiguousarray(faces, dtype=np.int32)
-    finite = np.isfinite(points).all(axis=1)
+    finite = np.logical_and.reduce(np.isfinite(points), axis=1)
     if not finite.all():  # vertices that no triangle uses may be anything
-        bad = ~finite[faces]
-        if bad.any():
-            row = int(np.argmax(bad.any(axis=1)))
-            vertex = int(faces[row][bad[row]][0])
+        row = int(np.argmin(finite[faces].all(axis=1)))
+        vertex = min(faces[row].tolist(), key=finite.__getitem__)
+        if not finite[vertex]:
             found = np.asarray(vertices[vertex]).tolist()
             mend = ": load it with dtype=np.float64" if np.isfinite(vertices[vertex]).all() else ""
-            raise ValueError(
-                f"{name}: vertex {vertex} of triangle {row} must be finite {real.name} numbers, got {found}{mend}"
-            )
+            expected = f"vertex {vertex} of triangle {row} must be finite {real.name} numbers"
+            raise ValueError(f"{name}: {expected}, got {found}{mend}")
     return points, faces

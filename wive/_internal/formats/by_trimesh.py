@@ -10,7 +10,7 @@ from wive._internal.formats import Mesh
 
 
 def read(data: bytes, name: str, kind: str) -> Mesh:
-    """Read a file of this kind (its extension without the dot); the meshes of a scene are placed and joined."""
+    """Read a file with this extension, given without its dot; meshes of a scene are placed and joined."""
     try:
         import trimesh
     except ImportError:

@@ -1,0 +1,96 @@
+"""STL, binary and text: three vertices of its own per facet, which share none."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wive._internal.formats import Mesh
+from wive._internal.formats.kinds import is_binary_stl
+from wive._internal.formats.text import Ints, Text, plain
+
+HEADER_BYTES = 84
+FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+# The words of a facet in text; None is a number.
+VERTEX = ("vertex", None, None, None)
+FACET_WORDS = ("facet", "normal", None, None, None, "outer", "loop", *VERTEX * 3, "endloop", "endfacet")
+CORNER_WORDS = np.array([[8, 9, 10], [12, 13, 14], [16, 17, 18]])
+SOLID_LINE = re.compile(rb"\s*(?:end\s*)?solid(?!\S)")
+
+
+def read(data: bytes, name: str, dtype: np.dtype[Any]) -> Mesh:
+    """Vertices, of this dtype in text and float32 else, and triangles."""
+    # Headers of binary files may begin with "solid", but text has no zero bytes.
+    is_text = (
+        data.lstrip(b"\xef\xbb\xbf\xff\xfe \t\r\n\0")[:10].replace(b"\0", b"").lower().startswith(b"solid")
+    )
+    if data[:2] not in (b"\xff\xfe", b"\xfe\xff"):
+        is_text = is_text and b"\0" not in data
+    corners = _text(data, name, dtype) if is_text and not is_binary_stl(data) else _binary(data, name)
+    return corners.reshape(-1, 3), np.arange(corners.size // 3).reshape(-1, 3)
+
+
+def _binary(data: bytes, name: str) -> NDArray[np.float32]:
+    if len(data) < HEADER_BYTES:
+        raise ValueError(
+            f"{name}: byte {len(data)}: expected `solid`, as text begins, or {HEADER_BYTES} bytes "
+            "of a binary header: the file is cut short or not STL"
+        )
+    count = int.from_bytes(data[HEADER_BYTES - 4 : HEADER_BYTES], "little")
+    whole, rest = divmod(len(data) - HEADER_BYTES, FACET.itemsize)
+    if count > whole:
+        raise ValueError(
+            f"{name}: byte {len(data)}: expected {count:,} facets, as the header has, "
+            f"got the file's end after {whole:,}: the file is cut short or damaged"
+        )
+    # Some programs append their own data; whole facets more mean that the header is wrong.
+    after = data[HEADER_BYTES + count * FACET.itemsize :]
+    if whole > count and not rest and after.strip(b"\0"):
+        raise ValueError(
+            f"{name}: byte {HEADER_BYTES - 4}: expected the number of facets, {whole:,} by the file's "
+            f"length, got {count:,}: mend the header"
+        )
+    return np.frombuffer(data, FACET, count, HEADER_BYTES)["corners"]
+
+
+def _text(data: bytes, name: str, dtype: np.dtype[Any]) -> NDArray[Any]:
+    text = Text(_without_names(plain(data, name).lower()), name)
+    count, rest = divmod(len(text.starts), len(FACET_WORDS))
+    words: Ints = np.arange(count * len(FACET_WORDS)).reshape(count, len(FACET_WORDS))
+    for facets in (words, np.arange(words.size, len(text.starts))[None]):
+        _check_keywords(text, facets)
+    if rest:
+        raise text.error(
+            len(text.starts), f"expected `{FACET_WORDS[rest] or 'a number'}`, got the file's end"
+        )
+    return text.reals(words[:, CORNER_WORDS], dtype)
+
+
+def _without_names(data: bytes) -> bytes:
+    """Empty the lines that begin and end solids, whose names may hold any words."""
+    kept, done = [], 0
+    at = data.find(b"solid")
+    while at >= 0:
+        begin, end = data.rfind(b"\n", 0, at) + 1, data.find(b"\n", at)
+        end = len(data) if end < 0 else end
+        if SOLID_LINE.match(data, begin, end):
+            kept.append(data[done:begin])
+            done = end
+        at = data.find(b"solid", end)
+    return b"".join([*kept, data[done:]])
+
+
+def _check_keywords(text: Text, facets: Ints) -> None:
+    """ValueError at the first word of facets (n,k), the last one maybe shorter, that is out of place."""
+    wrong = np.zeros(facets.shape, bool)
+    for place in range(facets.shape[1]):
+        keyword = FACET_WORDS[place]
+        if keyword:
+            wrong[:, place] = ~text.same(facets[:, place], keyword.encode())
+    if wrong.any():
+        at = int(np.argmax(wrong))
+        expected = f"expected `{FACET_WORDS[at % facets.shape[1]]}`"
+        raise text.error(int(facets.flat[at]), f"{expected}, got {text.quoted(int(facets.flat[at]))}")
