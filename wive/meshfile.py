@@ -14,7 +14,7 @@ from wive._internal.files import PathLike
 from wive._internal.formats import Mesh
 from wive._internal.formats.kinds import kind_of
 from wive._internal.npzfile import check_input
-from wive._internal.precision import Floats, Real, real_named
+from wive._internal.precision import FLOAT32, Floats, Real, real_named
 
 # Readers of formats that may be text.
 TEXT = ("obj", "off", "ply", "stl")
@@ -121,7 +121,8 @@ def _checked(mesh: Mesh, name: str, real: Real) -> tuple[Floats, NDArray[np.int3
         vertex = min(faces[row].tolist(), key=finite.__getitem__)
         if not finite[vertex]:
             found = np.asarray(vertices[vertex]).tolist()
-            mend = ": load it with dtype=np.float64" if np.isfinite(vertices[vertex]).all() else ""
+            is_too_large = real is FLOAT32 and not np.isnan(points[vertex]).any()
+            mend = ": if the file has larger numbers, load it with dtype=np.float64" if is_too_large else ""
             expected = f"vertex {vertex} of triangle {row} must be finite {real.name} numbers"
             raise ValueError(f"{name}: {expected}, got {found}{mend}")
     return points, faces

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 import zipfile
-import zlib
 from typing import Any
 
 import numpy as np
@@ -22,27 +21,34 @@ def read(data: bytes, name: str) -> Mesh:
     """Read the two arrays; no other one is unpacked."""
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
-            found = {file.filename.removesuffix(".npy"): file for file in archive.infolist()}
-            if not {"vertices", "faces"} <= found.keys():
-                listed = ", ".join(sorted(found)) or "none"
-                raise ValueError(
-                    f"{name}: expected arrays `vertices` and `faces`, found {listed:.100}: "
-                    "save them by np.savez(file, vertices=..., faces=...)"
-                )
-            return _array(archive, found["vertices"], name), _array(archive, found["faces"], name)
-    except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError, OSError) as error:
+            members = {file.filename.removesuffix(".npy"): file for file in archive.infolist()}
+            found = {key: _content(archive, members[key]) for key in ("vertices", "faces") if key in members}
+    except MemoryError:
+        raise
+    except Exception as error:  # damaged archives raise errors of many kinds
         raise _damaged(name) from error
+    if len(found) < 2:
+        listed = ", ".join(key if key.isidentifier() else ascii(key) for key in sorted(members)) or "none"
+        raise ValueError(
+            f"{name}: expected arrays `vertices` and `faces`, found {listed:.100}: "
+            "save them by np.savez(file, vertices=..., faces=...)"
+        )
+    return _array("vertices", found["vertices"], name), _array("faces", found["faces"], name)
 
 
 def _damaged(name: str) -> ValueError:
     return ValueError(f"{name}: not {EXPECTED}, or damaged")
 
 
-def _array(archive: zipfile.ZipFile, file: zipfile.ZipInfo, name: str) -> NDArray[Any]:
-    """One array; the sizes that headers claim are compared with the bytes before anything is allocated."""
+def _content(archive: zipfile.ZipFile, file: zipfile.ZipInfo) -> bytes:
+    """A member's bytes; an error, before any are made, if it can't have as many as it claims."""
     if file.file_size > MOST_INFLATION * (file.compress_size + 1):
-        raise _damaged(name)
-    content = archive.read(file)
+        raise ValueError
+    return archive.read(file)
+
+
+def _array(array_name: str, content: bytes, name: str) -> NDArray[Any]:
+    """One array; the size that its header claims is compared with its bytes before anything is allocated."""
     stream = io.BytesIO(content)
     try:
         version = npy.read_magic(stream)
@@ -50,9 +56,8 @@ def _array(archive: zipfile.ZipFile, file: zipfile.ZipInfo, name: str) -> NDArra
         shape, fortran, dtype = header(stream)
     except Exception as error:  # NumPy raises anything on a damaged header: tokenizer errors among others
         raise _damaged(name) from error
-    array_name = file.filename.removesuffix(".npy")
     if dtype.kind not in "iuf":
-        raise ValueError(f"{name}: `{array_name}` must hold numbers, got dtype {dtype}")
+        raise ValueError(f"{name}: `{array_name}` must hold numbers, got dtype {dtype!s:.60}")
     count = 1
     for side in shape:
         count *= side

@@ -71,6 +71,8 @@ def read_header(data: bytes, name: str) -> Header:
         match words:
             case [] | ["comment" | "obj_info", *_]:
                 pass
+            case _ if not all(map(str.isprintable, words)):
+                raise _error(name, number, "text", f"{_quoted(raw)}: the file is damaged")
             case ["format", form, "1.0"] if order is None and form in FORMATS:
                 order = FORMATS[form]
             case ["element", element, count] if re.fullmatch(r"\d{1,18}", count):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import re
 from typing import Any
 
@@ -18,17 +19,14 @@ FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute"
 VERTEX = ("vertex", None, None, None)
 FACET_WORDS = ("facet", "normal", None, None, None, "outer", "loop", *VERTEX * 3, "endloop", "endfacet")
 CORNER_WORDS = np.array([[8, 9, 10], [12, 13, 14], [16, 17, 18]])
+UTF_16 = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
 SOLID_LINE = re.compile(rb"\s*(?:end\s*)?solid(?!\S)")
 
 
 def read(data: bytes, name: str, dtype: np.dtype[Any]) -> Mesh:
     """Vertices, of this dtype in text and float32 else, and triangles."""
     # Headers of binary files may begin with "solid", but text has no zero bytes.
-    is_text = (
-        data.lstrip(b"\xef\xbb\xbf\xff\xfe \t\r\n\0")[:10].replace(b"\0", b"").lower().startswith(b"solid")
-    )
-    if data[:2] not in (b"\xff\xfe", b"\xfe\xff"):
-        is_text = is_text and b"\0" not in data
+    is_text = data.startswith(UTF_16) or b"\0" not in data
     corners = _text(data, name, dtype) if is_text and not is_binary_stl(data) else _binary(data, name)
     return corners.reshape(-1, 3), np.arange(corners.size // 3).reshape(-1, 3)
 
@@ -36,8 +34,8 @@ def read(data: bytes, name: str, dtype: np.dtype[Any]) -> Mesh:
 def _binary(data: bytes, name: str) -> NDArray[np.float32]:
     if len(data) < HEADER_BYTES:
         raise ValueError(
-            f"{name}: byte {len(data)}: expected `solid`, as text begins, or {HEADER_BYTES} bytes "
-            "of a binary header: the file is cut short or not STL"
+            f"{name}: byte {len(data)}: expected {HEADER_BYTES} bytes of a header, got the file's end: "
+            "the file is cut short or not STL"
         )
     count = int.from_bytes(data[HEADER_BYTES - 4 : HEADER_BYTES], "little")
     whole, rest = divmod(len(data) - HEADER_BYTES, FACET.itemsize)
@@ -57,15 +55,16 @@ def _binary(data: bytes, name: str) -> NDArray[np.float32]:
 
 
 def _text(data: bytes, name: str, dtype: np.dtype[Any]) -> NDArray[Any]:
-    text = Text(_without_names(plain(data, name).lower()), name)
+    data = plain(data, name).lower()
+    text = Text(_without_names(data), name)
+    if not SOLID_LINE.match(data):
+        raise text.error(0, f"expected `solid`, got {data[:20].decode('ascii', 'backslashreplace')!r}")
     count, rest = divmod(len(text.starts), len(FACET_WORDS))
     words: Ints = np.arange(count * len(FACET_WORDS)).reshape(count, len(FACET_WORDS))
     for facets in (words, np.arange(words.size, len(text.starts))[None]):
         _check_keywords(text, facets)
     if rest:
-        raise text.error(
-            len(text.starts), f"expected `{FACET_WORDS[rest] or 'a number'}`, got the file's end"
-        )
+        raise text.error(len(text.starts), f"expected {FACET_WORDS[rest] or 'a number'}, got the file's end")
     return text.reals(words[:, CORNER_WORDS], dtype)
 
 

@@ -1,0 +1,105 @@
+"""A simple polygon's triangles, one ear after the other (Meisters 1975)."""
+
+from __future__ import annotations
+
+from bisect import bisect_left, bisect_right
+from collections import deque
+
+# Corners looked at, over all ears of a polygon: some seconds. Outlines of 100,000 corners need a tenth.
+MOST_WORK = 30_000_000
+
+Triangles = list[tuple[int, int, int]]
+
+
+class Tangled(Exception):
+    """A polygon whose ears take too long to find."""
+
+
+def ears(u: list[float], v: list[float]) -> Triangles:
+    """Triangles of a polygon in the plane, counter-clockwise, as numbers of its corners.
+
+    Each has area and contains no other corner, not even on its edges, unless the polygon crosses itself.
+    """
+    ring = _Ring(u, v)
+    queue = deque(corner for corner in range(len(u)) if not ring.blocks[corner])
+    found: Triangles = []
+    while len(found) < len(u) - 3:
+        if queue:
+            corner = queue.popleft()
+            if ring.is_gone[corner] or not ring.is_ear(corner):
+                continue
+        else:  # the polygon crosses itself: what is left has no ear
+            corner = ring.some
+        before, after = ring.before[corner], ring.after[corner]
+        found.append((before, corner, after))
+        ring.cut(corner)
+        # Only an ear's neighbours can become ears.
+        queue.extend(neighbour for neighbour in (before, after) if not ring.blocks[neighbour])
+    last = ring.some
+    found.append((ring.before[last], last, ring.after[last]))
+    return found
+
+
+class _Ring:
+    """The corners that are left, in order, and those that may lie in an ear of others."""
+
+    def __init__(self, u: list[float], v: list[float]) -> None:
+        count = len(u)
+        self._u, self._v = u, v
+        self.before = [count - 1, *range(count - 1)]
+        self.after = [*range(1, count), 0]
+        self.is_gone = [False] * count
+        self.some = 0
+        self._work = 0
+        # Corners that are not convex: others are inside of no ear, and cutting ears makes no more of them.
+        self.blocks = [self._turn(self.before[i], i, self.after[i]) <= 0 for i in range(count)]
+        self._sort([i for i in range(count) if self.blocks[i]])
+
+    def _sort(self, blocking: list[int]) -> None:
+        """By u, so that an ear looks at a strip of the polygon."""
+        self._order = sorted(blocking, key=self._u.__getitem__)
+        self._sorted_u = [self._u[i] for i in self._order]
+        self._left = len(blocking)
+
+    def _turn(self, a: int, b: int, c: int) -> float:
+        u, v = self._u, self._v
+        return (u[b] - u[a]) * (v[c] - v[a]) - (v[b] - v[a]) * (u[c] - u[a])
+
+    def is_ear(self, corner: int) -> bool:
+        """Whether the triangle at a convex corner contains no other corner."""
+        u, v = self._u, self._v
+        triangle = (self.before[corner], corner, self.after[corner])
+        (au, av), (bu, bv), (cu, cv) = places = [(u[i], v[i]) for i in triangle]
+        first = bisect_left(self._sorted_u, min(au, bu, cu))
+        last = bisect_right(self._sorted_u, max(au, bu, cu))
+        self._work += last - first
+        if self._work > MOST_WORK:
+            raise Tangled(
+                f"a polygon of {len(u):,} corners is too tangled: triangulate the mesh before it is exported"
+            )
+        for i in self._order[first:last]:
+            if not self.blocks[i]:
+                continue
+            pu, pv = u[i], v[i]
+            if (
+                (bu - au) * (pv - av) >= (bv - av) * (pu - au)
+                and (cu - bu) * (pv - bv) >= (cv - bv) * (pu - bu)
+                and (au - cu) * (pv - cv) >= (av - cv) * (pu - cu)
+                # The bridge to a hole passes its ends twice: what lies at a corner is not inside.
+                and (pu, pv) not in places
+            ):
+                return False
+        return True
+
+    def cut(self, corner: int) -> None:
+        """Take a corner out."""
+        before, after = self.before[corner], self.after[corner]
+        self.after[before], self.before[after] = after, before
+        self.is_gone[corner] = True
+        self.some = after
+        for i in (before, corner, after):
+            if self.blocks[i] and (i == corner or self._turn(self.before[i], i, self.after[i]) > 0):
+                self.blocks[i] = False
+                self._left -= 1
+        if 2 * self._left < len(self._order):
+            self._sort([i for i in self._order if self.blocks[i]])
