@@ -1,0 +1,189 @@
+"""glTF 2.0: triangles of a .gltf or .glb file, in the order of its nodes.
+
+No reader on PyPI keeps that order and gives the accessors right: trimesh passes over sparse values and the
+scale of normalised integers and orders meshes by its own graph; pygltflib and gltflib read the JSON alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wive._internal.formats import Mesh
+from wive._internal.formats.gltf_accessors import MOST, Accessor, describe, values
+from wive._internal.formats.gltf_container import Document, compressed
+from wive._internal.formats.gltf_fields import Fields, index_of, members, objects, whole
+from wive._internal.formats.gltf_nodes import Drawn, Scene
+from wive._internal.formats.gltf_pose import default_weights, joint_matrices, morphed, placed, skinned
+
+LISTS, STRIP, FAN = 4, 5, 6
+
+
+@dataclass(frozen=True)
+class Primitive:
+    """A primitive of triangles, checked, and what tells its size before it is read."""
+
+    place: str
+    fields: Fields
+    positions: Accessor
+    indices: Accessor | None
+    mode: int
+    triangles: int
+
+
+def read(data: bytes, name: str, folder: str | None) -> Mesh:
+    """Vertices (v,3) and faces (f,3) of the document's scene.
+
+    Nodes come depth first, children in order, and each draws the primitives of its mesh in order, each with
+    its vertices and its triangles as the file lists them, placed in the world by float64 matrices. Vertices
+    are float32 if the file's are and nothing moves them, else float64. External buffers lie in `folder`.
+    """
+    try:
+        with np.errstate(all="ignore"):  # a Scene names a vertex that is not finite
+            return _read(Document(data, folder))
+    except ValueError as error:
+        raise ValueError(f"{name}: {error}") from None
+
+
+def _read(document: Document) -> Mesh:
+    scene = Scene(document)
+    meshes: dict[int, list[Primitive]] = {}
+    vertex_count = face_count = 0
+    for drawn in scene.drawn:
+        if drawn.mesh not in meshes:
+            meshes[drawn.mesh] = list(primitives(document, drawn.mesh, drawn.place))
+        vertex_count += sum(one.positions.count for one in meshes[drawn.mesh]) * len(drawn.matrices)
+        face_count += sum(one.triangles for one in meshes[drawn.mesh]) * len(drawn.matrices)
+    if max(vertex_count, face_count) > MOST:
+        raise ValueError(
+            f"scene: has {vertex_count} vertices and {face_count} triangles, expected at most {MOST}"
+        )
+    vertices: list[NDArray[Any]] = [np.empty((0, 3), np.float32)]
+    faces = [np.empty((0, 3), np.int32)]
+    shapes: dict[int, list[tuple[NDArray[Any], NDArray[np.int32]]]] = {}
+    start = 0
+    for drawn in scene.drawn:
+        if drawn.mesh not in shapes:
+            shapes[drawn.mesh] = [
+                (points(document, one), triangles(document, one)) for one in meshes[drawn.mesh]
+            ]
+        copies, corners = draw(
+            document, scene, drawn, list(zip(meshes[drawn.mesh], shapes[drawn.mesh], strict=True))
+        )
+        vertices.append(copies.reshape(-1, 3))
+        starts = start + copies.shape[1] * np.arange(len(copies), dtype=np.int32)
+        faces.append((corners + starts[:, None, None]).reshape(-1, 3))
+        start += len(vertices[-1])
+    return np.concatenate(vertices), np.concatenate(faces)
+
+
+def draw(
+    document: Document,
+    scene: Scene,
+    drawn: Drawn,
+    parts: list[tuple[Primitive, tuple[NDArray[Any], NDArray[np.int32]]]],
+) -> tuple[NDArray[Any], NDArray[np.int32]]:
+    """Vertices (k,n,3) in the world and corners (k,f,3) of the k copies of a mesh that a node draws."""
+    weights = default_weights(document.item("meshes", drawn.mesh, drawn.place), drawn.node, drawn.place)
+    skin = index_of(drawn.node, "skin", drawn.place)
+    matrices = drawn.matrices if skin is None else joint_matrices(document, scene, skin, drawn.place)
+    vertices: list[NDArray[Any]] = [np.empty((len(drawn.matrices), 0, 3), np.float32)]
+    corners = [np.empty((0, 3), np.int32)]
+    start = 0
+    for primitive, (rest, listed) in parts:
+        posed = morphed(document, rest, primitive.fields, weights, primitive.place)
+        if skin is None:
+            vertices.append(placed(posed, matrices))
+        else:
+            vertices.append(skinned(document, posed, primitive.fields, matrices, primitive.place)[None])
+        corners.append(listed + np.int32(start))
+        start += len(posed)
+    # A mirrored mesh turns the other side of its triangles out (section 3.7.4): their corners 1 and 2 change
+    # places, so that normals point as they do in the mesh.
+    mirrored = np.linalg.det(matrices[:, :3, :3]) < 0
+    if skin is not None:
+        mirrored = mirrored.all(keepdims=True)
+    forth = np.concatenate(corners)
+    back = forth[:, [0, 2, 1]]
+    return np.concatenate(vertices, axis=1), np.where(mirrored[:, None, None], back, forth)
+
+
+def primitives(document: Document, mesh: int, place: str) -> Iterator[Primitive]:
+    """The primitives of a mesh that have triangles: not those of points and lines or without positions."""
+    for at, fields in enumerate(
+        objects(document.item("meshes", mesh, place), "primitives", f"meshes[{mesh}]")
+    ):
+        here = f"meshes[{mesh}].primitives[{at}]"
+        mode = whole(fields, "mode", here, LISTS)
+        if mode > FAN:
+            raise ValueError(f"{here}: mode: expected 0 to {FAN}, found {mode}")
+        if mode < LISTS:
+            continue
+        if "KHR_draco_mesh_compression" in members(fields, "extensions", here):
+            check_fallback(document, fields, here)
+        position = index_of(members(fields, "attributes", here), "POSITION", here)
+        if position is None:  # section 3.7.2.1: not drawn
+            continue
+        positions = describe(document, position, f"{here}: POSITION", "VEC3")
+        index = index_of(fields, "indices", here)
+        indices = None if index is None else describe(document, index, f"{here}: indices", "SCALAR")
+        if indices is not None and (indices.dtype.kind != "u" or indices.normalized):
+            raise ValueError(
+                f"{indices.place}: componentType: expected unsigned integers for {here}: indices"
+            )
+        count = positions.count if indices is None else indices.count
+        if count % 3 if mode == LISTS else count < 3:
+            wanted = "a multiple of 3" if mode == LISTS else "at least 3"
+            raise ValueError(
+                f"{here}: mode {mode}: expected {wanted} vertices, found {count}: the file is damaged"
+            )
+        yield Primitive(here, fields, positions, indices, mode, count // 3 if mode == LISTS else count - 2)
+
+
+def check_fallback(document: Document, primitive: Fields, place: str) -> None:
+    """Raise ValueError unless a primitive compressed by Draco has its arrays in plain form as well."""
+    used = [
+        index_of(members(primitive, "attributes", place), "POSITION", place),
+        index_of(primitive, "indices", place),
+    ]
+    for index in used:
+        if index is not None and "bufferView" not in document.item("accessors", index, place):
+            raise ValueError(compressed(place, "KHR_draco_mesh_compression"))
+
+
+def points(document: Document, primitive: Primitive) -> NDArray[Any]:
+    """The positions of a primitive in its mesh, as floats."""
+    array = values(document, primitive.positions)
+    return array if array.dtype.kind == "f" else array.astype(np.float64)
+
+
+def triangles(document: Document, primitive: Primitive) -> NDArray[np.int32]:
+    """The corners (f,3) of a primitive's triangles, strips and fans taken apart as section 3.7.2.1 has it."""
+    count = primitive.positions.count
+    if primitive.indices is None:
+        order = np.arange(count, dtype=np.int32)
+    else:
+        listed = values(document, primitive.indices)[:, 0]
+        most = int(listed.max(initial=0))
+        if most == np.iinfo(listed.dtype).max:
+            raise ValueError(
+                f"{primitive.indices.place}: has the index {most}, which restarts a primitive and is not "
+                "allowed: export each strip as a primitive of its own, or write indices in a wider type"
+            )
+        if most >= count and len(listed):
+            raise ValueError(
+                f"{primitive.indices.place}: has the index {most}, expected at most {count - 1} for {count} "
+                "positions: the file is damaged"
+            )
+        order = listed.astype(np.int32)
+    if primitive.mode == LISTS:
+        return order.reshape(-1, 3)
+    if primitive.mode == FAN:
+        return np.stack([order[1:-1], order[2:], np.broadcast_to(order[:1], len(order) - 2)], axis=1)
+    corners = np.stack([order[:-2], order[1:-1], order[2:]], axis=1)
+    corners[1::2] = corners[1::2][:, [0, 2, 1]]  # every other triangle of a strip winds the other way
+    return corners
