@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from wive._internal.arguments import rays as checked_rays
 from wive._internal.arguments import refuse_lacking
 from wive._internal.files import atomic_write, check_output
-from wive._internal.npzfile import check_input, read_npy_or_npz
+from wive._internal.npzfile import Npz, check_input, open_npy_or_npz
 from wive._internal.picture import Settings
 from wive._internal.precision import Floats, Real, real_named
 from wive._internal.progress import progress_bar
@@ -155,17 +155,18 @@ def _camera(options: Namespace, scene: Scene) -> Camera:
 def _read_rays(name: str, real: Real) -> tuple[Floats, ...]:
     """Origins, directions, tmin and tmax, in the form that the core takes."""
     expected = "a file of rays, (n,6) or (n,8) in an .npy or `origins` and `directions` in an .npz"
-    loaded = read_npy_or_npz(name, expected)
-    if isinstance(loaded, dict):
-        if not {"origins", "directions"} <= loaded.keys():
-            raise ValueError(f"{name}: not {expected}: found arrays {', '.join(sorted(loaded)) or 'none'}")
-        limits = [loaded.get("tmin", 0.0), loaded.get("tmax", np.inf)]
-        columns = [loaded["origins"], loaded["directions"], *limits]
-    elif loaded.ndim != 2 or loaded.shape[1] not in (6, 8):
-        raise ValueError(f"{name}: not {expected}: found shape {loaded.shape}")
-    else:
-        limits = [loaded[:, 6], loaded[:, 7]] if loaded.shape[1] == 8 else [0.0, np.inf]
-        columns = [loaded[:, :3], loaded[:, 3:6], *limits]
+    with open_npy_or_npz(name, expected) as loaded:
+        if isinstance(loaded, Npz):
+            if not {"origins", "directions"} <= loaded.keys():
+                listed = ", ".join(sorted(loaded)) or "none"
+                raise ValueError(f"{name}: not {expected}: found arrays {listed:.100}")
+            limits = [loaded.get("tmin", 0.0), loaded.get("tmax", np.inf)]
+            columns = [loaded["origins"], loaded["directions"], *limits]
+        elif loaded.ndim != 2 or loaded.shape[1] not in (6, 8):
+            raise ValueError(f"{name}: not {expected}: found shape {loaded.shape}")
+        else:
+            limits = [loaded[:, 6], loaded[:, 7]] if loaded.shape[1] == 8 else [0.0, np.inf]
+            columns = [loaded[:, :3], loaded[:, 3:6], *limits]
     try:
         origins, directions, tmin, tmax = columns
         return checked_rays(origins, directions, tmin, tmax, real)

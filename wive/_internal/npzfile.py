@@ -1,25 +1,87 @@
-"""NumPy's own files, read without trusting them."""
+"""NumPy's own files, read without trusting them: headers are checked before anything is allocated."""
 
+from __future__ import annotations
+
+import io
+import math
 import os
-from typing import Any
+import zipfile
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from typing import IO, Any
 
 import numpy as np
+from numpy.lib import format as npy
 from numpy.typing import NDArray
 
 from wive._internal.files import PathLike
 
+# Deflate never makes more than this many bytes of one: a longer claim is false.
+MOST_INFLATION = 1032
+METHODS = {zipfile.ZIP_STORED: 1, zipfile.ZIP_DEFLATED: MOST_INFLATION}
+# A header is some 100 bytes; NumPy refuses one over 10,000 of its own accord.
+MOST_HEADER = 1 << 15
+CHUNK = 1 << 20
 
-def read_npz(path: PathLike, expected: str) -> dict[str, NDArray[Any]]:
-    """Every array of an npz file; `expected` says in errors what the file should have been."""
-    loaded = _load(path, expected)
-    if isinstance(loaded, np.ndarray):
-        raise ValueError(f"{os.fspath(path)}: not {expected}")
-    return loaded
+
+class Npz(Mapping[str, NDArray[Any]]):
+    """The arrays of an npz file by name, each unpacked when it is asked for.
+
+    Raises ValueError, in one line that names the file and the array, if the file is damaged or an array holds
+    Python objects, which only unpickling could read.
+    """
+
+    def __init__(self, file: IO[bytes], name: str, expected: str) -> None:
+        """Read the table of contents; `expected` says in errors what the file should have been."""
+        self._name, self._expected = name, expected
+        self._size = file.seek(0, os.SEEK_END)
+        with _refused(name, expected, "its table of contents"):
+            self._archive = zipfile.ZipFile(file)
+            self._members = {info.filename.removesuffix(".npy"): info for info in self._archive.infolist()}
+
+    def __getitem__(self, key: str) -> NDArray[Any]:
+        """The array `key`."""
+        info, place = self._members[key], f"array `{key:.40}`"
+        with _refused(self._name, self._expected, place):
+            most = METHODS.get(info.compress_type)
+            if most is None:
+                raise ValueError(f"compressed by method {info.compress_type}: save it by np.savez")
+            if info.compress_size > self._size or info.file_size > most * info.compress_size:
+                raise ValueError(f"claims {info.file_size} bytes from {info.compress_size}")
+            with self._archive.open(info) as stream:
+                return _array(stream, info.file_size)
+
+    def __iter__(self) -> Iterator[str]:
+        """Names of arrays, in the file's order."""
+        return iter(self._members)
+
+    def __len__(self) -> int:
+        """Number of arrays."""
+        return len(self._members)
 
 
-def read_npy_or_npz(path: PathLike, expected: str) -> NDArray[Any] | dict[str, NDArray[Any]]:
-    """The array of an npy file, or every array of an npz file by name."""
-    return _load(path, expected)
+@contextmanager
+def open_npz(path: PathLike, expected: str) -> Iterator[Npz]:
+    """The arrays of an npz file, while the block runs; `expected` says in errors what the file should be."""
+    name = check_input(path)
+    with open(name, "rb") as file:
+        yield Npz(file, name, expected)
+
+
+@contextmanager
+def open_npy_or_npz(path: PathLike, expected: str) -> Iterator[NDArray[Any] | Npz]:
+    """The array of an npy file, or the arrays of an npz file while the block runs."""
+    name = check_input(path)
+    with open(name, "rb") as file:
+        magic = file.read(len(npy.MAGIC_PREFIX))
+        size = file.seek(0, os.SEEK_END)
+        file.seek(0)
+        if magic != npy.MAGIC_PREFIX:
+            yield Npz(file, name, expected)
+            return
+        with _refused(name, expected, "its array"):
+            array = _array(file, size)
+        yield array
 
 
 def check_input(path: PathLike) -> str:
@@ -34,13 +96,47 @@ def check_input(path: PathLike) -> str:
     return name
 
 
-def _load(path: PathLike, expected: str) -> NDArray[Any] | dict[str, NDArray[Any]]:
-    name = check_input(path)
+@contextmanager
+def _refused(name: str, expected: str, place: str) -> Iterator[None]:
+    """Make one ValueError of whatever NumPy, zipfile and zlib raise on damaged bytes."""
     try:
-        with open(name, "rb") as file:
-            loaded = np.load(file, allow_pickle=False)
-            return loaded if isinstance(loaded, np.ndarray) else dict(loaded)
+        yield
     except MemoryError:
         raise
-    except Exception:  # NumPy raises anything on damaged bytes: tokenizer and zip errors among others
-        raise ValueError(f"{name}: not {expected}, or damaged") from None
+    except Exception as error:
+        reason = " ".join(str(error).split()) or type(error).__name__
+        raise ValueError(f"{name}: not {expected}, or damaged ({place}: {reason:.100})") from None
+
+
+def _array(stream: IO[bytes], size: int) -> NDArray[Any]:
+    """The array of an npy file of `size` bytes, in the memory order of the file."""
+    head = stream.read(MOST_HEADER)
+    shape, fortran, dtype, start = _header(head)
+    if dtype.hasobject:
+        raise ValueError(f"holds Python objects (dtype {dtype}), expected numbers")
+    wanted = math.prod(shape) * dtype.itemsize
+    if any(side < 0 for side in shape) or dtype.itemsize == 0 or wanted != size - start:
+        raise ValueError(f"claims shape {shape} of {dtype}, holds {size - start} bytes")
+    array = np.empty(shape, dtype, order="F" if fortran else "C")
+    left = memoryview(array.reshape(-1, order="A").view(np.uint8))
+    left[: len(head) - start] = head[start:]
+    left = left[len(head) - start :]
+    while left:
+        count = stream.readinto(left[:CHUNK])  # type: ignore[attr-defined]  # of io.BufferedIOBase
+        if not count:
+            raise ValueError(f"cut off {len(left)} bytes before its end")
+        left = left[count:]
+    stream.read(1)  # zipfile compares the checksum at the end
+    return array
+
+
+def _header(head: bytes) -> tuple[tuple[int, ...], bool, np.dtype[Any], int]:
+    """Shape, whether in Fortran order, dtype and length of an npy header."""
+    stream = io.BytesIO(head)
+    version = npy.read_magic(stream)
+    read = npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0
+    try:
+        shape, fortran, dtype = read(stream)
+    except MemoryError:  # Python's parser, of nested text; the header itself is short
+        raise ValueError("its header is nested too deep") from None
+    return shape, fortran, dtype, stream.tell()

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wive._internal.files import PathLike, atomic_write
-from wive._internal.npzfile import read_npz
+from wive._internal.npzfile import open_npz
 from wive._internal.precision import Floats
 
 FORMAT = "wive scene"
@@ -42,9 +42,10 @@ def read_scene(path: PathLike) -> tuple[Floats, NDArray[np.int32], Options]:
     """
     import json
 
-    arrays = read_npz(path, "a scene saved by wive")
-    if not {"header", "vertices", "faces"} <= arrays.keys():
-        raise ValueError(f"{path}: not a scene saved by wive")
+    with open_npz(path, "a scene saved by wive") as found:
+        if not {"header", "vertices", "faces"} <= found.keys():
+            raise ValueError(f"{path}: not a scene saved by wive")
+        arrays = {name: found[name] for name in ("header", "vertices", "faces")}
     try:
         header = json.loads(str(arrays["header"]))
         is_scene, version = header["format"] == FORMAT, header["version"]
@@ -56,7 +57,7 @@ def read_scene(path: PathLike) -> tuple[Floats, NDArray[np.int32], Options]:
             nodes=given["nodes"],
             quality=given.get("quality", "medium"),
         )
-    except (ValueError, TypeError, KeyError, AttributeError):
+    except (ValueError, TypeError, KeyError, AttributeError, RecursionError):
         is_scene = False
     if not is_scene:
         raise ValueError(f"{path}: not a scene saved by wive")
