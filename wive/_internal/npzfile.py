@@ -5,7 +5,6 @@ from __future__ import annotations
 import io
 import math
 import os
-import zipfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import IO, Any
@@ -14,11 +13,9 @@ import numpy as np
 from numpy.lib import format as npy
 from numpy.typing import NDArray
 
+from wive._internal.archives import Archive
 from wive._internal.files import PathLike
 
-# Deflate never makes more than this many bytes of one: a longer claim is false.
-MOST_INFLATION = 1032
-METHODS = {zipfile.ZIP_STORED: 1, zipfile.ZIP_DEFLATED: MOST_INFLATION}
 # A header is some 100 bytes; NumPy refuses one over 10,000 of its own accord.
 MOST_HEADER = 1 << 15
 CHUNK = 1 << 20
@@ -34,22 +31,21 @@ class Npz(Mapping[str, NDArray[Any]]):
     def __init__(self, file: IO[bytes], name: str, expected: str) -> None:
         """Read the table of contents; `expected` says in errors what the file should have been."""
         self._name, self._expected = name, expected
-        self._size = file.seek(0, os.SEEK_END)
         with _refused(name, expected, "its table of contents"):
-            self._archive = zipfile.ZipFile(file)
-            self._members = {info.filename.removesuffix(".npy"): info for info in self._archive.infolist()}
+            self._archive = Archive(file)
+        self._members = {member.removesuffix(".npy"): member for member in self._archive.names}
 
     def __getitem__(self, key: str) -> NDArray[Any]:
         """The array `key`."""
-        info, place = self._members[key], f"array `{key:.40}`"
-        with _refused(self._name, self._expected, place):
-            most = METHODS.get(info.compress_type)
-            if most is None:
-                raise ValueError(f"compressed by method {info.compress_type}: save it by np.savez")
-            if info.compress_size > self._size or info.file_size > most * info.compress_size:
-                raise ValueError(f"claims {info.file_size} bytes from {info.compress_size}")
-            with self._archive.open(info) as stream:
-                return _array(stream, info.file_size)
+        member = self._members[key]
+        with _refused(self._name, self._expected, f"array `{key:.40}`"):
+            stream, size = self._archive.open(member)
+            with stream:
+                return _array(stream, size)
+
+    def __contains__(self, key: object) -> bool:
+        """Whether there is such an array; it is not unpacked for that."""
+        return key in self._members
 
     def __iter__(self) -> Iterator[str]:
         """Names of arrays, in the file's order."""

@@ -14,13 +14,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wive._internal.formats import Mesh
-from wive._internal.formats.gltf_accessors import MOST, Accessor, describe, values
+from wive._internal.formats.gltf_accessors import Accessor, describe, values
 from wive._internal.formats.gltf_container import Document, compressed
 from wive._internal.formats.gltf_fields import Fields, index_of, members, objects, whole
 from wive._internal.formats.gltf_nodes import Drawn, Scene
-from wive._internal.formats.gltf_pose import default_weights, joint_matrices, morphed, placed, skinned
+from wive._internal.formats.gltf_pose import default_weights, joint_matrices, morphed, skinned
+from wive._internal.formats.placing import IDENTITY, Matrix, check_counts, joined
 
-LISTS, STRIP, FAN = 4, 5, 6
+LISTS, FAN = 4, 6  # modes; 5 is a strip
+Shape = tuple[NDArray[Any], NDArray[np.int32]]  # positions and corners of a primitive, in its mesh
 
 
 @dataclass(frozen=True)
@@ -58,58 +60,42 @@ def _read(document: Document) -> Mesh:
             meshes[drawn.mesh] = list(primitives(document, drawn.mesh, drawn.place))
         vertex_count += sum(one.positions.count for one in meshes[drawn.mesh]) * len(drawn.matrices)
         face_count += sum(one.triangles for one in meshes[drawn.mesh]) * len(drawn.matrices)
-    if max(vertex_count, face_count) > MOST:
-        raise ValueError(
-            f"scene: has {vertex_count} vertices and {face_count} triangles, expected at most {MOST}"
-        )
-    vertices: list[NDArray[Any]] = [np.empty((0, 3), np.float32)]
-    faces = [np.empty((0, 3), np.int32)]
-    shapes: dict[int, list[tuple[NDArray[Any], NDArray[np.int32]]]] = {}
-    start = 0
-    for drawn in scene.drawn:
-        if drawn.mesh not in shapes:
-            shapes[drawn.mesh] = [
-                (points(document, one), triangles(document, one)) for one in meshes[drawn.mesh]
-            ]
-        copies, corners = draw(
-            document, scene, drawn, list(zip(meshes[drawn.mesh], shapes[drawn.mesh], strict=True))
-        )
-        vertices.append(copies.reshape(-1, 3))
-        starts = start + copies.shape[1] * np.arange(len(copies), dtype=np.int32)
-        faces.append((corners + starts[:, None, None]).reshape(-1, 3))
-        start += len(vertices[-1])
-    return np.concatenate(vertices), np.concatenate(faces)
+    check_counts(vertex_count, face_count)
+    shapes: dict[int, list[Shape]] = {}
+    return joined(draw(document, scene, meshes, shapes, drawn) for drawn in scene.drawn)
 
 
 def draw(
     document: Document,
     scene: Scene,
+    meshes: dict[int, list[Primitive]],
+    shapes: dict[int, list[Shape]],
     drawn: Drawn,
-    parts: list[tuple[Primitive, tuple[NDArray[Any], NDArray[np.int32]]]],
-) -> tuple[NDArray[Any], NDArray[np.int32]]:
-    """Vertices (k,n,3) in the world and corners (k,f,3) of the k copies of a mesh that a node draws."""
+) -> tuple[NDArray[Any], NDArray[np.int32], Matrix]:
+    """Vertices (n,3), corners (f,3) and matrices (k,4,4) of the k copies of a mesh that a node draws."""
+    mesh = meshes[drawn.mesh]
+    if drawn.mesh not in shapes:
+        shapes[drawn.mesh] = [(points(document, one), triangles(document, one)) for one in mesh]
     weights = default_weights(document.item("meshes", drawn.mesh, drawn.place), drawn.node, drawn.place)
+    posed = [
+        morphed(document, rest, one.fields, weights, one.place)
+        for one, (rest, _) in zip(mesh, shapes[drawn.mesh], strict=True)
+    ]
+    starts = np.cumsum([0, *map(len, posed)], dtype=np.int32)
+    corners = [corners + start for (_, corners), start in zip(shapes[drawn.mesh], starts[:-1], strict=True)]
+    matrices = drawn.matrices
     skin = index_of(drawn.node, "skin", drawn.place)
-    matrices = drawn.matrices if skin is None else joint_matrices(document, scene, skin, drawn.place)
-    vertices: list[NDArray[Any]] = [np.empty((len(drawn.matrices), 0, 3), np.float32)]
-    corners = [np.empty((0, 3), np.int32)]
-    start = 0
-    for primitive, (rest, listed) in parts:
-        posed = morphed(document, rest, primitive.fields, weights, primitive.place)
-        if skin is None:
-            vertices.append(placed(posed, matrices))
-        else:
-            vertices.append(skinned(document, posed, primitive.fields, matrices, primitive.place)[None])
-        corners.append(listed + np.int32(start))
-        start += len(posed)
-    # A mirrored mesh turns the other side of its triangles out (section 3.7.4): their corners 1 and 2 change
-    # places, so that normals point as they do in the mesh.
-    mirrored = np.linalg.det(matrices[:, :3, :3]) < 0
-    if skin is not None:
-        mirrored = mirrored.all(keepdims=True)
-    forth = np.concatenate(corners)
-    back = forth[:, [0, 2, 1]]
-    return np.concatenate(vertices, axis=1), np.where(mirrored[:, None, None], back, forth)
+    if skin is not None:  # joints move the vertices to the world, whatever moves the node
+        joints = joint_matrices(document, scene, skin, drawn.place)
+        posed = [
+            skinned(document, rest, one.fields, joints, one.place)
+            for one, rest in zip(mesh, posed, strict=True)
+        ]
+        if (np.linalg.det(joints[:, :3, :3]) < 0).all():
+            corners = [triangle[:, [0, 2, 1]] for triangle in corners]
+        matrices = IDENTITY[None]
+    nothing: Shape = (np.empty((0, 3), np.float32), np.empty((0, 3), np.int32))
+    return np.concatenate([nothing[0], *posed]), np.concatenate([nothing[1], *corners]), matrices
 
 
 def primitives(document: Document, mesh: int, place: str) -> Iterator[Primitive]:

@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 
 from wive._internal.formats.gltf_container import Document
 from wive._internal.formats.gltf_fields import Fields, index_of, short, whole
+from wive._internal.formats.placing import MOST
 
 COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
-MOST = 2**31 - 1  # indices of vertices are int32
 
 
 @dataclass(frozen=True)

@@ -10,14 +10,12 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wive._internal.formats.gltf_accessors import describe, values
 from wive._internal.formats.gltf_container import Document
 from wive._internal.formats.gltf_fields import Fields, index_of, indices, listed, members, numbers, short
+from wive._internal.formats.placing import IDENTITY, Matrix
 
-Matrix = NDArray[np.float64]
-IDENTITY = np.eye(4)
 AT_REST = {"translation": (0.0, 0.0, 0.0), "rotation": (0.0, 0.0, 0.0, 1.0), "scale": (1.0, 1.0, 1.0)}
 
 

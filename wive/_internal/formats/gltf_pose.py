@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from wive._internal.formats.gltf_accessors import describe, values
 from wive._internal.formats.gltf_container import Document
 from wive._internal.formats.gltf_fields import Fields, index_of, indices, members, numbers, objects
-from wive._internal.formats.gltf_nodes import IDENTITY, Scene
+from wive._internal.formats.gltf_nodes import Scene
+from wive._internal.formats.placing import moved
 
 Doubles = NDArray[np.float64]
 
@@ -102,27 +103,3 @@ def influences(document: Document, attributes: Fields, key: str, count: int, pla
     if accessor.count != count:
         raise ValueError(f"{place}: {key}: expected {count} values, one per position, found {accessor.count}")
     return values(document, accessor)
-
-
-def placed(positions: NDArray[Any], matrices: Doubles) -> NDArray[Any]:
-    """Positions (k,n,3) in the world of the k copies of a mesh; the same numbers if no matrix moves them."""
-    if (matrices == IDENTITY).all():
-        return np.broadcast_to(positions, (len(matrices), *positions.shape))
-    return moved(positions, matrices[:, None, :3])
-
-
-def moved(positions: NDArray[Any], matrices: Doubles) -> Doubles:
-    """Positions (n,3) times matrices (...,n,3,4) or (...,1,3,4).
-
-    Written out per component: a product by BLAS may round a vertex by its place in the array, and so open the
-    seam between two primitives.
-    """
-    x, y, z = (positions[:, axis].astype(np.float64) for axis in range(3))
-    rows = [
-        matrices[..., row, 0] * x
-        + matrices[..., row, 1] * y
-        + matrices[..., row, 2] * z
-        + matrices[..., row, 3]
-        for row in range(3)
-    ]
-    return np.stack(rows, axis=-1)

@@ -1,0 +1,65 @@
+"""Copies of meshes, placed in the world by matrices and joined in order."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wive._internal.formats import Mesh
+
+Matrix = NDArray[np.float64]
+IDENTITY = np.eye(4)
+MOST = 2**31 - 1  # vertices and triangles are numbered by int32
+
+
+def check_counts(vertices: int, triangles: int) -> None:
+    """Raise ValueError if copies have more vertices or triangles than int32 numbers, before any is made."""
+    if max(vertices, triangles) > MOST:
+        raise ValueError(f"scene: has {vertices} vertices and {triangles} triangles, expected at most {MOST}")
+
+
+def joined(parts: Iterable[tuple[NDArray[Any], NDArray[np.int32], Matrix]]) -> Mesh:
+    """Vertices and faces of all parts in order, each of vertices (n,3), corners (f,3) and matrices (k,4,4).
+
+    A part has a copy per matrix. A mirrored copy turns the other side of its triangles out: their corners 1
+    and 2 change places, so that normals point as they do in the mesh. Vertices are float32 if all parts' are
+    and no matrix moves them.
+    """
+    vertices: list[NDArray[Any]] = [np.empty((0, 3), np.float32)]
+    faces = [np.empty((0, 3), np.int32)]
+    start = 0
+    for points, corners, matrices in parts:
+        vertices.append(placed(points, matrices).reshape(-1, 3))
+        mirrored = np.linalg.det(matrices[:, :3, :3]) < 0
+        copies = np.where(mirrored[:, None, None], corners[:, [0, 2, 1]], corners)
+        starts = start + len(points) * np.arange(len(matrices), dtype=np.int32)
+        faces.append((copies + starts[:, None, None]).reshape(-1, 3))
+        start += len(vertices[-1])
+    return np.concatenate(vertices), np.concatenate(faces)
+
+
+def placed(positions: NDArray[Any], matrices: Matrix) -> NDArray[Any]:
+    """Positions (k,n,3) in the world of k copies of a mesh; the same numbers if no matrix moves them."""
+    if (matrices == IDENTITY).all():
+        return np.broadcast_to(positions, (len(matrices), *positions.shape))
+    return moved(positions, matrices[:, None, :3])
+
+
+def moved(positions: NDArray[Any], matrices: Matrix) -> Matrix:
+    """Positions (n,3) times matrices (...,n,3,4) or (...,1,3,4).
+
+    Written out per component: a product by BLAS may round a vertex by its place in the array, and so open the
+    seam between two meshes.
+    """
+    x, y, z = (positions[:, axis].astype(np.float64) for axis in range(3))
+    rows = [
+        matrices[..., row, 0] * x
+        + matrices[..., row, 1] * y
+        + matrices[..., row, 2] * z
+        + matrices[..., row, 3]
+        for row in range(3)
+    ]
+    return np.stack(rows, axis=-1)
