@@ -92,6 +92,10 @@ def _read(kind: str, data: bytes, name: str, folder: str | None, real: Real) -> 
         from wive._internal.formats import threemf
 
         return threemf.read(data, name)
+    if kind == "dae":
+        from wive._internal.formats import dae
+
+        return dae.read(data, name)
     if kind in TEXT:
         reader = import_module(f"wive._internal.formats.{kind}")
         read: Callable[[bytes, str, np.dtype[Any]], Mesh] = reader.read

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wive._internal.formats.placing import IDENTITY, Matrix
-from wive._internal.formats.xml_events import Attributes, Handler, parse
+from wive._internal.formats.xml_events import Attributes, Handler, floats, parse
 
 CORE = re.compile(r"http://schemas\.microsoft\.com/3dmanufacturing/core/\d+/\d+")
 # Required extensions that are read, or leave triangles where they are; objects of beams are refused singly.
@@ -128,7 +128,7 @@ class Part(Handler):
 
     def _numbers(self, words: list[str], place: str) -> NDArray[np.float64]:
         try:
-            numbers = np.array([float(word) for word in words], np.float64)
+            numbers = floats(words)
         except ValueError as error:
             raise ValueError(f"{place}: {error}: the file is damaged") from None
         if not np.isfinite(numbers).all():

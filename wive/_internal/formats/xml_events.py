@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable
 from xml.parsers import expat
 
+import numpy as np
+from numpy.typing import NDArray
+
 Attributes = dict[str, str]
+# What Python's float takes beside numbers: 1_0 and digits of other scripts.
+STRANGE = re.compile(r"[_\x80-\U0010ffff]")
 
 
 class Handler:
@@ -54,3 +60,13 @@ def parse(chunks: Iterable[bytes], handler: Handler) -> None:
         ) from None
     except LookupError as error:
         raise ValueError(f"line 1: {error}: save the file as UTF-8") from None
+    finally:  # a circle of references would keep what the handler holds
+        del handler.line
+
+
+def floats(words: list[str]) -> NDArray[np.float64]:
+    """The numbers that words are; ValueError, which quotes the word, if one is none."""
+    if STRANGE.search("".join(words)):
+        wrong = next(word for word in words if STRANGE.search(word))
+        raise ValueError(f"could not convert string to float: {wrong!r:.40}")
+    return np.array([float(word) for word in words], np.float64)

@@ -1,0 +1,148 @@
+"""COLLADA: the triangles of the scene of a .dae file, in the order of its nodes.
+
+Read by the standard library alone: pycollada, by which trimesh reads, rounds positions to float32, and
+trimesh leaves out nodes that it does not understand, without a word.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wive._internal.formats import Mesh
+from wive._internal.formats.dae_geometry import Geometry, read_geometry
+from wive._internal.formats.dae_tree import Document, Element
+from wive._internal.formats.placing import IDENTITY, Matrix, check_counts, joined
+
+DRAWN = ("instance_geometry", "node", "instance_node", "instance_controller")
+
+
+def read(data: bytes, name: str) -> Mesh:
+    """Vertices (v,3), float64, and faces (f,3) of the scene: nodes depth first, in the order of the file.
+
+    Each copy of a geometry has its own vertices, all of the geometry's. Unit and up axis are the file's.
+    """
+    try:
+        with np.errstate(all="ignore"):  # a Scene names a vertex that is not finite
+            return Scene(Document(data), name).mesh()
+    except ValueError as error:
+        raise ValueError(f"{name}: {str(error).removeprefix(f'{name}: ')}") from None
+
+
+class Scene:
+    """The visual scene of a document."""
+
+    def __init__(self, document: Document, name: str) -> None:
+        """Find the scene."""
+        self._document, self._name = document, name
+        scene = document.root.first("scene")
+        instance = None if scene is None else scene.first("instance_visual_scene")
+        if instance is None:
+            raise ValueError("COLLADA: has no scene, so no geometry is placed: export a scene")
+        self._root = document.target(instance, "url", "visual_scene")
+        self._geometries: dict[int, Geometry] = {}  # by id() of elements, as all below
+        self._matrices: dict[int, Matrix] = {}
+        self._counts: dict[int, tuple[int, int]] = {}
+
+    def mesh(self) -> Mesh:
+        """All copies of geometries, joined."""
+        self._count()
+        check_counts(*self._counts[id(self._root)])
+        return joined(self._draw())
+
+    def _below(self, node: Element) -> list[Element]:
+        """The nodes and geometries that a node holds, in order."""
+        found = []
+        for child in node.all(*DRAWN):
+            if child.tag == "instance_controller":
+                raise ValueError(
+                    f"{child.place}: is moved by a skin or morph, which is not read: export the scene as "
+                    "glTF, or with its modifiers applied"
+                )
+            if child.tag == "node":
+                found.append(child)
+            else:
+                found.append(self._document.target(child, "url", child.tag.removeprefix("instance_")))
+        return found
+
+    def _count(self) -> None:
+        """Count vertices and triangles below each node, and read geometries and matrices."""
+        stack, entered = [self._root], set()
+        while stack:  # no recursion: nodes may be nested deep
+            element = stack[-1]
+            key = id(element)
+            if key in self._counts:
+                stack.pop()
+            elif element.tag == "geometry":
+                one = self._geometries[key] = read_geometry(self._document, element, self._name)
+                self._counts[key] = len(one.vertices), len(one.triangles)
+            else:
+                below = self._below(element)
+                missing = {id(one): one for one in below if id(one) not in self._counts}
+                if missing and key in entered:
+                    raise ValueError(f"{element.place}: holds itself: the file is damaged")
+                entered.add(key)
+                stack += missing.values()
+                if not missing:
+                    counts = [self._counts[id(one)] for one in below]
+                    total = sum(vertices for vertices, _ in counts), sum(triangles for _, triangles in counts)
+                    self._counts[key] = total
+                    if total != (0, 0):  # others may be of cameras, with transforms that are not read
+                        self._matrices[key] = matrix_of(element)
+
+    def _draw(self) -> Iterator[tuple[NDArray[Any], NDArray[np.int32], Matrix]]:
+        """Vertices, corners and matrix of each copy of a geometry, in order."""
+        stack: list[tuple[Element, Matrix]] = [(self._root, IDENTITY)]
+        while stack:
+            element, outer = stack.pop()
+            if self._counts[id(element)] == (0, 0):  # nested empty nodes may have copies without number
+                continue
+            if element.tag == "geometry":
+                one = self._geometries[id(element)]
+                yield one.vertices, one.triangles, outer[None]
+                continue
+            inner = self._matrices[id(element)]
+            matrix = outer if inner is IDENTITY else outer @ inner
+            stack += [(child, matrix) for child in reversed(self._below(element))]
+
+
+def matrix_of(node: Element) -> Matrix:
+    """The product of a node's transforms, in their order, from the node to its parent."""
+    result = IDENTITY
+    for child in node.all("matrix", "translate", "rotate", "scale", "lookat", "skew"):
+        matrix = np.eye(4)
+        if child.tag == "matrix":
+            matrix = child.numbers(16).reshape(4, 4)
+        elif child.tag == "translate":
+            matrix[:3, 3] = child.numbers(3)
+        elif child.tag == "scale":
+            matrix[:3, :3] = np.diag(child.numbers(3))
+        elif child.tag == "rotate":
+            matrix[:3, :3] = rotation(child)
+        else:
+            raise ValueError(f"{child.place}: is not read: export the node with a matrix")
+        if (matrix[3] != IDENTITY[3]).any() or not np.isfinite(matrix).all():
+            raise ValueError(f"{child.place}: expected finite numbers, and a last row of 0 0 0 1")
+        result = matrix if result is IDENTITY else result @ matrix
+    return result
+
+
+def rotation(element: Element) -> Matrix:
+    """The rotation (3,3) about an axis by an angle in degrees (Rodrigues); quarter turns are exact."""
+    *axis, degrees = element.numbers(4).tolist()
+    if degrees == 0:
+        return np.eye(3)
+    length = float(np.linalg.norm(axis))
+    if not (0 < length < np.inf and abs(degrees) < np.inf):
+        raise ValueError(f"{element.place}: expected an axis and an angle, found {axis} and {degrees}")
+    x, y, z = (value / length for value in axis)
+    quarters, rest = divmod(degrees, 90)
+    sine, cosine = np.sin(np.radians(rest)), np.cos(np.radians(rest))
+    for _ in range(int(quarters % 4)):
+        sine, cosine = cosine, -sine
+    across = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    along = np.outer([x, y, z], [x, y, z])
+    return np.asarray(cosine * np.eye(3) + sine * across + (1 - cosine) * along)

@@ -1,0 +1,135 @@
+"""COLLADA geometries: positions, and triangles, polygons, strips and fans in the order of the file."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wive._internal.formats.dae_tree import Document, Element
+from wive._internal.formats.triangulate import triangulate
+
+PRIMITIVES = ("triangles", "polylist", "polygons", "tristrips", "trifans")
+
+
+@dataclass(frozen=True)
+class Geometry:
+    """All positions of a geometry, and its triangles."""
+
+    vertices: NDArray[np.float64]
+    triangles: NDArray[np.int32]
+
+
+def read_geometry(document: Document, geometry: Element, name: str) -> Geometry:
+    """The mesh of a geometry; lines have no triangles. `name` is the file's, for triangulate's errors."""
+    mesh = geometry.first("mesh")
+    if mesh is None:
+        kinds = (
+            ", ".join(child.tag for child in geometry.children if child.tag not in ("asset", "extra"))
+            or "nothing"
+        )
+        raise ValueError(
+            f"{geometry.place}: expected a mesh, found {kinds:.60}: export it as a mesh of triangles"
+        )
+    found = [one for one in mesh.all(*PRIMITIVES) if one.children or one.whole("count")]
+    if not found:
+        return Geometry(np.empty((0, 3)), np.empty((0, 3), np.int32))
+    vertices = positions(document, mesh.one("vertices"))
+    pieces = [corners(document, mesh, primitive, vertices, name) for primitive in found]
+    return Geometry(vertices, np.concatenate(pieces).astype(np.int32))
+
+
+def positions(document: Document, vertices: Element) -> NDArray[np.float64]:
+    """The source of a mesh's POSITION, as its accessor picks it from an array."""
+    inputs = [one for one in vertices.all("input") if one.attributes.get("semantic") == "POSITION"]
+    if len(inputs) != 1:
+        raise ValueError(f"{vertices.place}: expected one input POSITION, found {len(inputs)}")
+    source = document.target(inputs[0], "source", "source")
+    accessor = source.one("technique_common").one("accessor")
+    array = document.target(accessor, "source", "float_array", "int_array")
+    values = array.numbers(array.whole("count"))
+    names = [one.attributes.get("name", "") for one in accessor.all("param")]
+    count, stride = accessor.whole("count"), accessor.whole("stride", 1)
+    start = accessor.whole("offset", 0)
+    columns = [at for at, axis in enumerate(names) if axis] or list(range(len(names)))
+    if sorted(names[at] for at in columns) == ["X", "Y", "Z"]:
+        columns = [names.index(axis) for axis in "XYZ"]
+    if len(columns) != 3 or max(columns) >= stride:
+        raise ValueError(
+            f"{accessor.place}: expected params X, Y and Z in a stride of {stride}, found {names}"
+        )
+    if count and start + (count - 1) * stride + max(columns) >= len(values):
+        raise ValueError(
+            f"{accessor.place}: claims {count} positions of stride {stride}, {array.place} has {len(values)} "
+            "numbers: the file is damaged"
+        )
+    rows = start + stride * np.arange(count)[:, None]
+    result: NDArray[np.float64] = values[rows + np.array(columns)]
+    return result
+
+
+def corners(
+    document: Document, mesh: Element, primitive: Element, vertices: NDArray[np.float64], name: str
+) -> NDArray[np.int64]:
+    """Triangles (f,3) of a primitive element."""
+    inputs = list(primitive.all("input"))
+    stride = max((one.whole("offset") for one in inputs), default=-1) + 1
+    offsets = [one.whole("offset") for one in inputs if one.attributes.get("semantic") == "VERTEX"]
+    if len(offsets) != 1:
+        raise ValueError(f"{primitive.place}: expected one input VERTEX, found {len(offsets)}")
+    if primitive.first("ph"):
+        raise ValueError(f"{primitive.place}: has polygons with holes, which are not read: export triangles")
+    runs = []
+    for run in primitive.all("p"):
+        numbers = run.integers()
+        if len(numbers) % stride:
+            raise ValueError(f"{run.place}: expected a multiple of {stride} numbers, found {len(numbers)}")
+        runs.append(numbers[offsets[0] :: stride])
+    listed = np.concatenate([np.empty(0, np.int64), *runs])
+    if len(listed) and listed.max() >= len(vertices):
+        raise ValueError(
+            f"{primitive.place}: has the index {listed.max()}, expected at most {len(vertices) - 1}: "
+            "the file is damaged"
+        )
+    found = taken_apart(primitive, listed, [len(run) for run in runs], vertices, name)
+    claimed = primitive.whole("count")
+    made = (
+        len(found) if primitive.tag == "triangles" else claimed if primitive.tag == "polylist" else len(runs)
+    )
+    if made != claimed:
+        raise ValueError(f"{primitive.place}: claims a count of {claimed}, holds {made}: the file is damaged")
+    return found
+
+
+def taken_apart(
+    primitive: Element,
+    listed: NDArray[np.int64],
+    runs: list[int],
+    vertices: NDArray[np.float64],
+    name: str,
+) -> NDArray[np.int64]:
+    """Triangles (f,3) of the vertices that a primitive lists, in runs of these lengths."""
+    if primitive.tag == "triangles":
+        if len(listed) % 3:
+            raise ValueError(f"{primitive.place}: expected a multiple of 3 vertices, found {len(listed)}")
+        return listed.reshape(-1, 3)
+    if primitive.tag == "polylist":
+        runs = primitive.one("vcount").integers().tolist()
+        if len(runs) != primitive.whole("count") or sum(runs) != len(listed):
+            raise ValueError(
+                f"{primitive.place}: claims {primitive.whole('count')} polygons, vcount has {len(runs)} of "
+                f"{sum(runs)} vertices, p has {len(listed)}: the file is damaged"
+            )
+    if min(runs, default=3) < 3:
+        raise ValueError(f"{primitive.place}: expected at least 3 vertices each, found {min(runs)}")
+    if primitive.tag in ("polylist", "polygons"):
+        return triangulate(vertices, np.array(runs, np.int64), listed, name)
+    pieces = [np.empty((0, 3), np.int64)]
+    for run in np.split(listed, np.cumsum(runs)[:-1]):
+        first = run[:-2] if primitive.tag == "tristrips" else np.broadcast_to(run[:1], len(run) - 2)
+        piece = np.stack([first, run[1:-1], run[2:]], axis=1)
+        if primitive.tag == "tristrips":
+            piece[1::2] = piece[1::2][:, [0, 2, 1]]  # every other triangle of a strip winds the other way
+        pieces.append(piece)
+    return np.concatenate(pieces)
