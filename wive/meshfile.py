@@ -100,9 +100,9 @@ def _read(kind: str, data: bytes, name: str, folder: str | None, real: Real) -> 
         reader = import_module(f"wive._internal.formats.{kind}")
         read: Callable[[bytes, str, np.dtype[Any]], Mesh] = reader.read
         return read(data, name, real.dtype)
-    from wive._internal.formats import by_trimesh
+    from wive._internal.formats.unread import unread
 
-    return by_trimesh.read(data, name, kind)
+    raise unread(name, kind)
 
 
 def _checked(mesh: Mesh, name: str, real: Real) -> tuple[Floats, NDArray[np.int32]]:

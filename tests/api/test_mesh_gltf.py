@@ -4,10 +4,11 @@ import base64
 import io
 import json
 import struct
+import sys
 
 import numpy as np
 import pytest
-from support.gltf_files import Model, chunk, glb, primitive
+from support.gltf_files import Model, chunk, compressed, glb, primitive
 
 import wive
 
@@ -603,16 +604,60 @@ def test_required_extensions_of_materials_and_lights_change_nothing(name):
 
 
 @pytest.mark.parametrize("required", [False, True])
-def test_meshes_compressed_by_draco_are_read_from_their_plain_form_or_refused(required):
+def test_meshes_compressed_by_draco_are_read_from_their_plain_form_if_there_is_one(required, monkeypatch):
+    monkeypatch.setitem(sys.modules, "DracoPy", None)
     model, position, indices = square()
     draco = {"KHR_draco_mesh_compression": {"bufferView": 0, "attributes": {"POSITION": 0}}}
     model.node(mesh=model.mesh(primitive(position, indices, extensions=draco)))
     model.json["extensionsRequired"] = list(draco) * required
     assert (corners(model.glb()) == CORNERS).all()
     del model.json["accessors"][0]["bufferView"]
-    assert refusal(model.glb()).startswith(
-        "meshes[0].primitives[0]: is compressed by KHR_draco_mesh_compression, which is not read"
-    )
+    with pytest.raises(ImportError) as error:
+        wive.load_mesh(model.glb())
+    place = "mesh (bytes): meshes[0].primitives[0]: KHR_draco_mesh_compression: needs DracoPy"
+    assert str(error.value).startswith(f'{place}: pip install "wive[draco]"')
+
+
+def draco_data() -> bytes:
+    draco = pytest.importorskip("DracoPy")
+    data: bytes = draco.encode(SQUARE, np.reshape(LISTED, (2, 3)).astype(np.uint32), quantization_bits=0)
+    return data
+
+
+def test_meshes_compressed_by_draco_are_unpacked():
+    data = draco_data()
+    # Draco has an order of its own, of triangles and of corners; each triangle winds as it did.
+    assert turned(corners(compressed(data).glb())) == turned(CORNERS)
+
+
+def turned(triangles: np.ndarray) -> list[list[list[float]]]:
+    """The triangles in an order that does not depend on theirs, each from its least corner on."""
+    corners = [triangle[at:] + triangle[:at] for triangle in triangles.tolist() for at in (0, 1, 2)]
+    return sorted(corner for corner in corners if corner[0] == min(corner))
+
+
+@pytest.mark.parametrize(
+    ("change", "expected"),
+    [
+        ({"data": b"DRACO" + b"\1" * 59}, "KHR_draco_mesh_compression: "),
+        (
+            {"count": 5},
+            "accessors[0]: count: expected 4, as meshes[0].primitives[0]: KHR_draco_mesh_compression has",
+        ),
+        (
+            {"triangles": 3},
+            "accessors[1]: count: expected 6, as meshes[0].primitives[0]: KHR_draco_mesh_compression",
+        ),
+        ({"mode": 5}, "meshes[0].primitives[0]: KHR_draco_mesh_compression: expected mode 4, triangles"),
+    ],
+)
+def test_draco_data_that_the_document_does_not_describe_is_refused(change, expected):
+    assert expected in refusal(compressed(**{"data": draco_data(), **change}).glb())
+    model = compressed(draco_data())
+    model.json["meshes"][0]["primitives"][0]["extensions"]["KHR_draco_mesh_compression"]["attributes"] = {
+        "POSITION": 7
+    }
+    assert "KHR_draco_mesh_compression: POSITION: its data has no attribute 7" in refusal(model.glb())
 
 
 @pytest.mark.parametrize("name", ["EXT_meshopt_compression", "KHR_meshopt_compression"])

@@ -9,6 +9,7 @@ import time
 
 import numpy as np
 import pytest
+from support.gltf_files import compressed
 from support.meshes import random_rays, sphere
 
 import wive
@@ -218,14 +219,14 @@ def test_bad_usage_is_one_line(capsys, arguments, expected):
     [
         ("PIL", ("render",), "render"),
         ("matplotlib", ("render",), "render"),
-        ("trimesh", ("info", "{tmp}/mesh.stl"), "trimesh"),
+        ("DracoPy", ("info", "{tmp}/mesh.glb"), "draco"),
     ],
 )
 def test_a_missing_package_is_named_with_the_extra_that_brings_it(
     tmp_path, monkeypatch, capsys, package, arguments, extra
 ):
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "mesh.stl").write_text("solid")
+    (tmp_path / "mesh.glb").write_bytes(compressed().glb())
     for name in [package, *(name for name in sys.modules if name.startswith(f"{package}."))]:
         monkeypatch.setitem(sys.modules, name, None)
     assert run(*(argument.format(tmp=tmp_path) for argument in arguments)) == 2

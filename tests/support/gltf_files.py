@@ -85,3 +85,15 @@ class Model:
 def primitive(position: int, indices: int | None = None, **fields: Any) -> dict[str, Any]:
     result = {"attributes": {"POSITION": position}, **fields}
     return result if indices is None else {**result, "indices": indices}
+
+
+def compressed(data: bytes = b"DRACO", count: int = 4, triangles: int = 2, mode: int = 4) -> Model:
+    """A model of one mesh that only Draco data has."""
+    model = Model()
+    position = model.accessor(componentType=5126, count=count, type="VEC3")
+    indices = model.accessor(componentType=5123, count=3 * triangles, type="SCALAR")
+    extension = {"bufferView": model.view(data), "attributes": {"POSITION": 0}}
+    extensions = {"KHR_draco_mesh_compression": extension}
+    model.node(mesh=model.mesh(primitive(position, indices, mode=mode, extensions=extensions)))
+    model.json["extensionsRequired"] = ["KHR_draco_mesh_compression"]
+    return model

@@ -158,8 +158,7 @@ def _read_rays(name: str, real: Real) -> tuple[Floats, ...]:
     with open_npy_or_npz(name, expected) as loaded:
         if isinstance(loaded, Npz):
             if not {"origins", "directions"} <= loaded.keys():
-                listed = ", ".join(sorted(loaded)) or "none"
-                raise ValueError(f"{name}: not {expected}: found arrays {listed:.100}")
+                raise ValueError(f"{name}: not {expected}: found arrays {loaded.listed()}")
             limits = [loaded.get("tmin", 0.0), loaded.get("tmax", np.inf)]
             columns = [loaded["origins"], loaded["directions"], *limits]
         elif loaded.ndim != 2 or loaded.shape[1] not in (6, 8):

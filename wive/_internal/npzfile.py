@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from wive._internal.archives import Archive
 from wive._internal.files import PathLike
+from wive._internal.lines import one_line
 
 # A header is some 100 bytes; NumPy refuses one over 10,000 of its own accord.
 MOST_HEADER = 1 << 15
@@ -50,6 +51,10 @@ class Npz(Mapping[str, NDArray[Any]]):
     def __iter__(self) -> Iterator[str]:
         """Names of arrays, in the file's order."""
         return iter(self._members)
+
+    def listed(self) -> str:
+        """The names of the arrays as errors list them."""
+        return one_line(", ".join(sorted(self._members)))[:100] or "none"
 
     def __len__(self) -> int:
         """Number of arrays."""
@@ -100,7 +105,7 @@ def _refused(name: str, expected: str, place: str) -> Iterator[None]:
     except MemoryError:
         raise
     except Exception as error:
-        reason = " ".join(str(error).split()) or type(error).__name__
+        reason = one_line(str(error) or type(error).__name__)
         raise ValueError(f"{name}: not {expected}, or damaged ({place}: {reason:.100})") from None
 
 

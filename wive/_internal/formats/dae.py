@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from wive._internal.formats import Mesh
 from wive._internal.formats.dae_geometry import Geometry, read_geometry
 from wive._internal.formats.dae_tree import Document, Element
+from wive._internal.formats.named import named
 from wive._internal.formats.placing import IDENTITY, Matrix, check_counts, joined
 
 DRAWN = ("instance_geometry", "node", "instance_node", "instance_controller")
@@ -25,11 +26,8 @@ def read(data: bytes, name: str) -> Mesh:
 
     Each copy of a geometry has its own vertices, all of the geometry's. Unit and up axis are the file's.
     """
-    try:
-        with np.errstate(all="ignore"):  # a Scene names a vertex that is not finite
-            return Scene(Document(data), name).mesh()
-    except ValueError as error:
-        raise ValueError(f"{name}: {str(error).removeprefix(f'{name}: ')}") from None
+    with named(name):
+        return Scene(Document(data), name).mesh()
 
 
 class Scene:

@@ -15,10 +15,12 @@ from numpy.typing import NDArray
 
 from wive._internal.formats import Mesh
 from wive._internal.formats.gltf_accessors import Accessor, describe, values
-from wive._internal.formats.gltf_container import Document, compressed
+from wive._internal.formats.gltf_container import Document
+from wive._internal.formats.gltf_draco import is_compressed, unpack
 from wive._internal.formats.gltf_fields import Fields, index_of, members, objects, whole
 from wive._internal.formats.gltf_nodes import Drawn, Scene
 from wive._internal.formats.gltf_pose import default_weights, joint_matrices, morphed, skinned
+from wive._internal.formats.named import named
 from wive._internal.formats.placing import IDENTITY, Matrix, check_counts, joined
 
 LISTS, FAN = 4, 6  # modes; 5 is a strip
@@ -44,11 +46,8 @@ def read(data: bytes, name: str, folder: str | None) -> Mesh:
     its vertices and its triangles as the file lists them, placed in the world by float64 matrices. Vertices
     are float32 if the file's are and nothing moves them, else float64. External buffers lie in `folder`.
     """
-    try:
-        with np.errstate(all="ignore"):  # a Scene names a vertex that is not finite
-            return _read(Document(data, folder))
-    except ValueError as error:
-        raise ValueError(f"{name}: {error}") from None
+    with named(name):
+        return _read(Document(data, folder))
 
 
 def _read(document: Document) -> Mesh:
@@ -109,8 +108,8 @@ def primitives(document: Document, mesh: int, place: str) -> Iterator[Primitive]
             raise ValueError(f"{here}: mode: expected 0 to {FAN}, found {mode}")
         if mode < LISTS:
             continue
-        if "KHR_draco_mesh_compression" in members(fields, "extensions", here):
-            check_fallback(document, fields, here)
+        if is_compressed(document, fields, here):
+            unpack(document, fields, here)
         position = index_of(members(fields, "attributes", here), "POSITION", here)
         if position is None:  # section 3.7.2.1: not drawn
             continue
@@ -128,17 +127,6 @@ def primitives(document: Document, mesh: int, place: str) -> Iterator[Primitive]
                 f"{here}: mode {mode}: expected {wanted} vertices, found {count}: the file is damaged"
             )
         yield Primitive(here, fields, positions, indices, mode, count // 3 if mode == LISTS else count - 2)
-
-
-def check_fallback(document: Document, primitive: Fields, place: str) -> None:
-    """Raise ValueError unless a primitive compressed by Draco has its arrays in plain form as well."""
-    used = [
-        index_of(members(primitive, "attributes", place), "POSITION", place),
-        index_of(primitive, "indices", place),
-    ]
-    for index in used:
-        if index is not None and "bufferView" not in document.item("accessors", index, place):
-            raise ValueError(compressed(place, "KHR_draco_mesh_compression"))
 
 
 def points(document: Document, primitive: Primitive) -> NDArray[Any]:

@@ -23,6 +23,7 @@ WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 class Accessor:
     """What an accessor says of its array, checked; `fields` has where the values are."""
 
+    index: int
     place: str
     fields: Fields
     count: int
@@ -43,7 +44,7 @@ def describe(document: Document, index: int, place: str, kind: str) -> Accessor:
     dtype, normalized = component(fields, here), fields.get("normalized", False)
     if not isinstance(normalized, bool) or (normalized and dtype.itemsize == 4):
         raise ValueError(f"{here}: normalized: expected true for integers of 8 or 16 bits only, or false")
-    return Accessor(here, fields, count, kind, dtype, normalized)
+    return Accessor(index, here, fields, count, kind, dtype, normalized)
 
 
 def component(fields: Fields, place: str) -> np.dtype[Any]:
@@ -63,7 +64,11 @@ def values(document: Document, accessor: Accessor) -> NDArray[Any]:
     """
     width = WIDTHS[accessor.kind]
     base = index_of(accessor.fields, "bufferView", accessor.place)
-    if base is None:  # zeros, for sparse values to replace
+    if accessor.index in document.arrays:
+        array = document.arrays[accessor.index]
+        if array.shape[1:] != (width,) or array.dtype.kind != ("u" if width == 1 else accessor.dtype.kind):
+            raise ValueError(f"{accessor.place}: its compressed data is not of its type: the file is damaged")
+    elif base is None:  # zeros, for sparse values to replace
         array = np.zeros((accessor.count, width), accessor.dtype)
     else:
         start = whole(accessor.fields, "byteOffset", accessor.place, 0)

@@ -12,11 +12,13 @@ import struct
 from typing import Any
 from urllib.parse import unquote, unquote_to_bytes
 
+from numpy.typing import NDArray
+
 from wive._internal.formats.gltf_fields import Fields, listed, members, short, whole
 
 JSON_CHUNK, BIN_CHUNK = 0x4E4F534A, 0x004E4942
-# Mesh data that only a decoder can read. A primitive or a buffer view says whether it needs one.
-COMPRESSION = ("KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_meshopt_compression")
+# Buffer views that only a decoder can read, unless their buffer has the data in plain form as well.
+COMPRESSION = ("EXT_meshopt_compression", "KHR_meshopt_compression")
 # Required extensions that are read, or that say nothing of where triangles are; many of these by prefix.
 KNOWN = {
     *COMPRESSION,
@@ -26,6 +28,7 @@ KNOWN = {
     "EXT_mesh_gpu_instancing",
     "EXT_structural_metadata",
     "KHR_animation_pointer",
+    "KHR_draco_mesh_compression",
     "KHR_mesh_quantization",
     "KHR_node_hoverability",
     "KHR_node_selectability",
@@ -61,6 +64,7 @@ class Document:
         """Read the JSON; raises ValueError unless it is of glTF 2.0 and requires nothing that is not read."""
         text, self._binary = split_chunks(data)
         self.root = parse(text)
+        self.arrays: dict[int, NDArray[Any]] = {}  # of accessors whose data had to be unpacked
         self._folder = folder
         self._buffers: dict[int, memoryview] = {}
         check_version(self.root)
@@ -84,7 +88,10 @@ class Document:
         start, size = whole(view, "byteOffset", here, 0), whole(view, "byteLength", here)
         packed = [name for name in COMPRESSION if name in members(view, "extensions", here)]
         if packed and not self._has_data(buffer, here):
-            raise ValueError(compressed(here, packed[0]))
+            raise ValueError(
+                f"{here}: is compressed by {packed[0]}, which is not read: export the model without mesh "
+                "compression, or convert it to PLY"
+            )
         data = self._buffer(buffer, here)
         if start + size > len(data):
             raise ValueError(
@@ -218,14 +225,6 @@ def check_extensions(root: Fields) -> None:
                 f"extensionsRequired: {short(name)} is not read: export the model without this extension, or "
                 "convert it to PLY"
             )
-
-
-def compressed(place: str, name: str) -> str:
-    """What a message says of mesh data in a compressed form."""
-    return (
-        f"{place}: is compressed by {name}, which is not read: export the model without mesh compression "
-        "(in Blender: glTF export, Compression off), or convert it to PLY"
-    )
 
 
 def decode_data_uri(uri: str, place: str) -> bytes:

@@ -14,9 +14,8 @@ def read(data: bytes, name: str) -> Mesh:
     """Read the two arrays; no other one is unpacked."""
     arrays = Npz(io.BytesIO(data), name, EXPECTED)
     if not {"vertices", "faces"} <= arrays.keys():
-        listed = ", ".join(sorted(arrays)) or "none"
         raise ValueError(
-            f"{name}: expected arrays `vertices` and `faces`, found {listed:.100}: "
+            f"{name}: expected arrays `vertices` and `faces`, found {arrays.listed()}: "
             "save them by np.savez(file, vertices=..., faces=...)"
         )
     return arrays["vertices"], arrays["faces"]

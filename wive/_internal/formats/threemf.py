@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from wive._internal.archives import Archive
 from wive._internal.formats import Mesh
+from wive._internal.formats.named import named
 from wive._internal.formats.placing import IDENTITY, Matrix, check_counts, joined
 from wive._internal.formats.threemf_part import Object, Part, Reference
 from wive._internal.formats.xml_events import Attributes, Handler, parse
@@ -99,11 +100,8 @@ def read(data: bytes, name: str) -> Mesh:
 
     Each copy of an object has its own vertices, all of the object's. Numbers are in the file's unit.
     """
-    try:
-        with np.errstate(all="ignore"):  # a Scene names a vertex that is not finite
-            return _read(Package(data))
-    except ValueError as error:
-        raise ValueError(f"{name}: {error}") from None
+    with named(name):
+        return _read(Package(data))
 
 
 def _read(package: Package) -> Mesh:
