@@ -18,6 +18,8 @@ from wive._internal.precision import FLOAT32, Floats, Real, real_named
 
 # Readers of formats that may be text.
 TEXT = ("obj", "off", "ply", "stl")
+# Modules of other readers.
+OTHERS = {"npz": "npz", "3mf": "threemf", "dae": "dae"}
 # Vertices and triangles are numbered by int32.
 MOST = 2**31 - 1
 
@@ -80,22 +82,14 @@ def _content(source: MeshSource) -> tuple[str, str | None, bytes]:
 
 def _read(kind: str, data: bytes, name: str, folder: str | None, real: Real) -> Mesh:
     """Import the reader of this kind and run it."""
-    if kind == "npz":
-        from wive._internal.formats import npz
-
-        return npz.read(data, name)
     if kind in ("gltf", "glb", "vrm"):
         from wive._internal.formats import gltf
 
         return gltf.read(data, name, folder)
-    if kind == "3mf":
-        from wive._internal.formats import threemf
-
-        return threemf.read(data, name)
-    if kind == "dae":
-        from wive._internal.formats import dae
-
-        return dae.read(data, name)
+    if kind in OTHERS:
+        reader = import_module(f"wive._internal.formats.{OTHERS[kind]}")
+        plain: Callable[[bytes, str], Mesh] = reader.read
+        return plain(data, name)
     if kind in TEXT:
         reader = import_module(f"wive._internal.formats.{kind}")
         read: Callable[[bytes, str, np.dtype[Any]], Mesh] = reader.read

@@ -148,6 +148,7 @@ def test_other_encodings_prefixes_and_foreign_elements_are_ordinary():
             ['objectid="1"'],
             "object 1: triangle 0: expected indices below 4, found",
         ),
+        ({"1": MESH + MESH}, ['objectid="1"'], "object 1: has a second mesh"),
         ({"1": mesh(POINTS, [])}, ['objectid="1"'], "has no triangles"),
         ({"1": MESH + "</object><object id='1'>"}, ['objectid="1"'], "a second object '1'"),
         (
@@ -229,3 +230,11 @@ def test_damaged_packages_are_refused():
     assert "expected a model part" in refusal(package(text, target="/a.txt").replace(b".rels", b".rel_"))
     encrypted = data.replace(b"\x14\0\0\0\x08\0", b"\x14\0\1\0\x08\0")
     assert "archive: _rels/.rels: is encrypted" in refusal(encrypted)
+
+
+def test_meshes_of_many_rows_are_read_whole():
+    random = np.random.default_rng(1)
+    points = random.normal(size=(30_000, 3))
+    faces = random.integers(30_000, size=(40_000, 3))
+    vertices, read = wive.load_mesh(package(model({"1": mesh(points, faces)}, ['objectid="1"'])), np.float64)
+    assert (vertices == points).all() and (read == faces).all()

@@ -99,7 +99,7 @@ def test_numbers_keep_double_precision_unit_and_up_axis():
 
 
 def test_cameras_and_what_the_scene_does_not_use_may_be_anything():
-    other = '<geometry id="bad"><spline/></geometry>'
+    other = '<geometry id="bad"><convex_mesh/></geometry>'
     camera = node("<lookat>0 0 9 0 0 0 0 1 0</lookat><instance_camera url='#c'/>")
     assert heights(document(SQUARE + other, camera + DRAWN)) == [0]
 
@@ -125,9 +125,9 @@ def test_cameras_and_what_the_scene_does_not_use_may_be_anything():
         ),
         (SQUARE, node('<instance_node url="#n"/>', key="n"), "line 4: node 'n': holds itself"),
         (
-            '<geometry id="a"><spline/></geometry>',
+            '<geometry id="a"><convex_mesh/></geometry>',
             DRAWN,
-            "geometry 'a': expected a mesh, found spline",
+            "geometry 'a': expected a mesh, found convex_mesh",
         ),
         (
             SQUARE.replace('"VERTEX"', '"POSITION"'),
@@ -233,3 +233,15 @@ def test_copies_beyond_the_range_of_indices_are_refused_before_they_are_made():
 
 def test_nodes_nested_twenty_thousand_deep_are_read():
     assert heights(document(SQUARE, "<node>" * 20_000 + draw("a") + "</node>" * 20_000)) == [0]
+
+
+def test_curves_and_lines_have_no_triangles():
+    curves = '<geometry id="b"><spline/></geometry>' + geometry("c", POINTS, primitive("lines", [0, 1]))
+    vertices, faces = mesh(document(SQUARE + curves, node(draw("b"), draw("a"), draw("c"))))
+    assert (len(vertices), len(faces)) == (5, 2)
+
+
+def test_inputs_may_share_an_offset_and_ids_may_be_escaped():
+    shared = SQUARE.replace('offset="1"', 'offset="0"').replace("0 0 1 0 2 0 0 0 2 0 3 0", "0 1 2\n0 2 3 ")
+    assert heights(document(shared, DRAWN)) == [0]
+    assert heights(document(SQUARE.replace('id="a"', 'id="a b"'), node(draw("a%20b")))) == [0]

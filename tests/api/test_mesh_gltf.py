@@ -300,6 +300,16 @@ def test_skins_are_in_the_pose_of_their_joints():
     assert np.abs(vertices - np.add(SQUARE, [[0, 0, 1], [0, 0, 3], [0, 0, 3], [0, 0, 2.6]])).max() < 1e-12
 
 
+def test_instances_with_attributes_of_their_own_alone_are_copies_in_place():
+    model, position, indices = square()
+    instancing = {"attributes": {"_ID": model.array([5, 6, 7], "u2")}}
+    mesh = model.mesh(primitive(position, indices))
+    model.node(mesh=mesh, extensions={"EXT_mesh_gpu_instancing": instancing})
+    assert corners(model.glb()).tolist() == np.tile(CORNERS, (3, 1, 1)).tolist()
+    instancing["attributes"]["SCALE"] = model.array(np.ones((2, 3)), "f4")
+    assert "EXT_mesh_gpu_instancing: expected attributes of one count, found [2, 3]" in refusal(model.glb())
+
+
 def test_hidden_nodes_are_left_out():
     model, position, indices = square()
     mesh = model.mesh(primitive(position, indices))

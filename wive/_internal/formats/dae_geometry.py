@@ -22,19 +22,17 @@ class Geometry:
 
 
 def read_geometry(document: Document, geometry: Element, name: str) -> Geometry:
-    """The mesh of a geometry; lines have no triangles. `name` is the file's, for triangulate's errors."""
+    """The mesh of a geometry; lines and splines have no triangles. Errors of polygons begin with `name`."""
+    nothing = Geometry(np.empty((0, 3)), np.empty((0, 3), np.int32))
+    if geometry.first("spline"):
+        return nothing
     mesh = geometry.first("mesh")
     if mesh is None:
-        kinds = (
-            ", ".join(child.tag for child in geometry.children if child.tag not in ("asset", "extra"))
-            or "nothing"
-        )
-        raise ValueError(
-            f"{geometry.place}: expected a mesh, found {kinds:.60}: export it as a mesh of triangles"
-        )
+        kinds = ", ".join(child.tag for child in geometry.children) or "nothing"
+        raise ValueError(f"{geometry.place}: expected a mesh, found {kinds:.60}: export it as triangles")
     found = [one for one in mesh.all(*PRIMITIVES) if one.children or one.whole("count")]
     if not found:
-        return Geometry(np.empty((0, 3)), np.empty((0, 3), np.int32))
+        return nothing
     vertices = positions(document, mesh.one("vertices"))
     pieces = [corners(document, mesh, primitive, vertices, name) for primitive in found]
     return Geometry(vertices, np.concatenate(pieces).astype(np.int32))

@@ -11,12 +11,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from wive._internal.archives import MOST_INFLATION
 from wive._internal.formats.gltf_container import Document
 from wive._internal.formats.gltf_fields import Fields, index_of, short, whole
 from wive._internal.formats.placing import MOST
 
 COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
+# Zeros that take no bytes of the file: not more than deflate would make of it, or this.
+LEAST_CLAIM = 1 << 24
 
 
 @dataclass(frozen=True)
@@ -69,6 +72,12 @@ def values(document: Document, accessor: Accessor) -> NDArray[Any]:
         if array.shape[1:] != (width,) or array.dtype.kind != ("u" if width == 1 else accessor.dtype.kind):
             raise ValueError(f"{accessor.place}: its compressed data is not of its type: the file is damaged")
     elif base is None:  # zeros, for sparse values to replace
+        size = accessor.count * width * accessor.dtype.itemsize
+        if size > max(LEAST_CLAIM, MOST_INFLATION * document.size):
+            raise ValueError(
+                f"{accessor.place}: claims {accessor.count} values without a bufferView, {size} bytes in a "
+                f"file of {document.size}"
+            )
         array = np.zeros((accessor.count, width), accessor.dtype)
     else:
         start = whole(accessor.fields, "byteOffset", accessor.place, 0)

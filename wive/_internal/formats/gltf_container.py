@@ -8,6 +8,7 @@ from __future__ import annotations
 import base64
 import json
 import os
+import re
 import struct
 from typing import Any
 from urllib.parse import unquote, unquote_to_bytes
@@ -19,38 +20,18 @@ from wive._internal.formats.gltf_fields import Fields, listed, members, short, w
 JSON_CHUNK, BIN_CHUNK = 0x4E4F534A, 0x004E4942
 # Buffer views that only a decoder can read, unless their buffer has the data in plain form as well.
 COMPRESSION = ("EXT_meshopt_compression", "KHR_meshopt_compression")
-# Required extensions that are read, or that say nothing of where triangles are; many of these by prefix.
-KNOWN = {
-    *COMPRESSION,
-    "EXT_feature_metadata",
-    "EXT_instance_features",
-    "EXT_mesh_features",
+# Required extensions that are read, and others that leave triangles where they are.
+READ = {
     "EXT_mesh_gpu_instancing",
-    "EXT_structural_metadata",
-    "KHR_animation_pointer",
     "KHR_draco_mesh_compression",
     "KHR_mesh_quantization",
-    "KHR_node_hoverability",
-    "KHR_node_selectability",
     "KHR_node_visibility",
-    "KHR_techniques_webgl",
-    "KHR_xmp",
-    "KHR_xmp_json_ld",
 }
-HARMLESS = (
-    "ADOBE_materials_",
-    "EXT_lights_",
-    "EXT_texture_",
-    "KHR_lights_",
-    "KHR_materials_",
-    "KHR_texture_",
-)
-HARMLESS_VENDORS = (
-    "MSFT_texture_dds",
-    "MSFT_packing_",
-    "MOZ_lightmap",
-    "GOOGLE_texture_basis",
-    "CESIUM_primitive_outline",
+HARMLESS = re.compile(
+    r"[A-Z0-9]+_(materials|lights|texture|audio|physics|xmp|feature|structural|articulations)(_.*)?|"
+    r"EXT_(instance_features|mesh_features|mesh_manifold)|KHR_(animation_pointer|implicit_shapes|interactivity)|"
+    r"KHR_(node_hoverability|node_selectability|techniques_webgl)|MSFT_(lod|packing_.*)|MOZ_lightmap|"
+    r"CESIUM_primitive_outline|AGI_stk_metadata|FB_geometry_metadata|VRM|VRMC_.*"
 )
 
 
@@ -62,6 +43,7 @@ class Document:
 
     def __init__(self, data: bytes, folder: str | None) -> None:
         """Read the JSON; raises ValueError unless it is of glTF 2.0 and requires nothing that is not read."""
+        self.size = len(data)
         text, self._binary = split_chunks(data)
         self.root = parse(text)
         self.arrays: dict[int, NDArray[Any]] = {}  # of accessors whose data had to be unpacked
@@ -219,7 +201,7 @@ def check_extensions(root: Fields) -> None:
     """Raise ValueError if the document requires an extension that might change triangles."""
     for name in listed(root, "extensionsRequired", "document"):
         if not isinstance(name, str) or (
-            name not in KNOWN and not name.startswith((*HARMLESS, *HARMLESS_VENDORS))
+            name not in READ and name not in COMPRESSION and not HARMLESS.fullmatch(name)
         ):
             raise ValueError(
                 f"extensionsRequired: {short(name)} is not read: export the model without this extension, or "

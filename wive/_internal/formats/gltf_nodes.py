@@ -13,7 +13,16 @@ import numpy as np
 
 from wive._internal.formats.gltf_accessors import describe, values
 from wive._internal.formats.gltf_container import Document
-from wive._internal.formats.gltf_fields import Fields, index_of, indices, listed, members, numbers, short
+from wive._internal.formats.gltf_fields import (
+    Fields,
+    index_of,
+    indices,
+    listed,
+    members,
+    numbers,
+    short,
+    whole,
+)
 from wive._internal.formats.placing import IDENTITY, Matrix
 
 AT_REST = {"translation": (0.0, 0.0, 0.0), "rotation": (0.0, 0.0, 0.0, 1.0), "scale": (1.0, 1.0, 1.0)}
@@ -101,13 +110,13 @@ def roots(document: Document) -> tuple[list[int], str]:
 def local_matrices(nodes: list[Fields], places: list[str]) -> Matrix:
     """Matrices (n,4,4) from each node to its parent."""
     parts = {key: np.tile(np.array(value), (len(nodes), 1)) for key, value in AT_REST.items()}
-    whole = {}
+    given = {}
     for at, (node, place) in enumerate(zip(nodes, places, strict=True)):
         moved = [key for key in AT_REST if key in node]
         for key in moved:
             parts[key][at] = numbers(node, key, place, len(AT_REST[key]))
         if "matrix" in node:
-            whole[at] = matrix = numbers(node, "matrix", place, 16).reshape(4, 4).T  # column-major
+            given[at] = matrix = numbers(node, "matrix", place, 16).reshape(4, 4).T  # column-major
             if moved:
                 raise ValueError(f"{place}: has both matrix and {moved[0]}, expected one of them")
             if (matrix[3] != IDENTITY[3]).any():
@@ -115,7 +124,7 @@ def local_matrices(nodes: list[Fields], places: list[str]) -> Matrix:
                     f"{place}: matrix: expected a last row of 0 0 0 1, found {short(matrix[3].tolist())}"
                 )
     result = composed(**parts, places=places)
-    for at, matrix in whole.items():
+    for at, matrix in given.items():
         result[at] = matrix
     return result
 
@@ -152,18 +161,21 @@ def instances(document: Document, node: Fields, world: Matrix, place: str) -> Ma
         for key, value in AT_REST.items()
         if (index := index_of(attributes, name := key.upper(), here)) is not None
     }
-    counts = sorted({accessor.count for accessor in found.values()})
+    others = [index_of(attributes, key, here) for key in attributes if key.lower() not in found]
+    counts = {accessor.count for accessor in found.values()}
+    counts |= {
+        whole(document.item("accessors", index, here), "count", f"accessors[{index}]")
+        for index in others
+        if index is not None
+    }
     if len(counts) != 1:
-        raise ValueError(
-            f"{here}: expected TRANSLATION, ROTATION or SCALE, of equal counts, found {short(counts)}"
-        )
+        raise ValueError(f"{here}: expected attributes of one count, found {short(sorted(counts))}")
+    (count,) = counts
     parts = {
-        key: values(document, found[key]).astype(np.float64)
-        if key in found
-        else np.tile(value, (counts[0], 1))
+        key: values(document, found[key]).astype(np.float64) if key in found else np.tile(value, (count, 1))
         for key, value in AT_REST.items()
     }
-    return world @ composed(**parts, places=[here] * counts[0])
+    return world @ composed(**parts, places=[here] * count)
 
 
 def shown(node: Fields, place: str) -> bool:

@@ -36,6 +36,8 @@ def _by_content(data: bytes) -> str:
         return _by_members(data)
     if head.startswith(b"{") and b'"asset"' in data:
         return "gltf"
+    if b"<COLLADA" in head:
+        return "dae"
     if OFF_WORD.match(head):
         return "off"
     if is_binary_stl(data) or head[:5].lower() == b"solid":

@@ -9,6 +9,7 @@ from __future__ import annotations
 import io
 from collections.abc import Iterator
 from typing import Any
+from urllib.parse import unquote
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,6 +48,8 @@ class Package:
     def part(self, path: str, place: str) -> Part:
         """The model part at this path of the package, which `place` refers to."""
         name = path.lstrip("/").lower()
+        if name not in self._names:
+            name = unquote(name)
         if name not in self._names:
             raise ValueError(
                 f"{place}: refers to {path!r:.60}, which is not in the package: the file is damaged"

@@ -21,6 +21,7 @@ KNOWN = re.compile(
     r"http://schemas\.(?:microsoft\.com|3mf\.io)/3dmanufacturing/"
     r"(?:core|material|production|trianglesets|beamlattice|slice)(?:/balls)?/\d+/\d+"
 )
+BATCH = 1 << 15  # words converted at once
 PRODUCTION = re.compile(r"http://schemas\.microsoft\.com/3dmanufacturing/production/\d+/\d+ path")
 
 
@@ -46,6 +47,44 @@ class Object:
     triangles: NDArray[np.int32] = field(default_factory=lambda: np.empty((0, 3), np.int32))
 
 
+class Rows:
+    """Rows of three numbers, converted from words by and by, since words take ten times the memory."""
+
+    def __init__(self) -> None:
+        """Begin with no rows."""
+        self._words: list[str] = []
+        self._numbers = [np.empty(0)]
+
+    def add(self, words: list[str], place: str) -> None:
+        """Add a row."""
+        self._words += words
+        if len(self._words) >= BATCH:
+            self._convert(place)
+
+    def take(self, place: str) -> NDArray[np.float64]:
+        """All rows (n,3), and begin again."""
+        self._convert(place)
+        rows = np.concatenate(self._numbers).reshape(-1, 3)
+        self._numbers = [np.empty(0)]
+        return rows
+
+    def _convert(self, place: str) -> None:
+        self._numbers.append(finite(self._words, place))
+        self._words = []
+
+
+def finite(words: list[str], place: str) -> NDArray[np.float64]:
+    """The finite numbers that words are."""
+    try:
+        numbers = floats(words)
+    except ValueError as error:
+        raise ValueError(f"{place}: {error}: the file is damaged") from None
+    if not np.isfinite(numbers).all():
+        found = words[int(np.argmin(np.isfinite(numbers)))]
+        raise ValueError(f"{place}: expected finite numbers, found {found!r:.40}")
+    return numbers
+
+
 class Part(Handler):
     """The objects of a model part by id, and the items of its build in order."""
 
@@ -59,8 +98,8 @@ class Part(Handler):
         self._has_model = False
         self._prefixes: dict[str, str] = {}
         self._object = Object("")
-        self._vertices: list[str] = []
-        self._triangles: list[str] = []
+        self._vertices, self._triangles = Rows(), Rows()
+        self._is_core = {"": True}  # by namespace
         try:
             parse(chunks, self)
         except ValueError as error:
@@ -76,15 +115,17 @@ class Part(Handler):
         """Note what the element holds."""
         space, _, name = tag.rpartition(" ")
         parent = self._open[-1] if self._open else ""
-        is_core = not space or CORE.fullmatch(space) is not None
+        is_core = self._is_core.get(space)
+        if is_core is None:
+            is_core = self._is_core[space] = CORE.fullmatch(space) is not None
         self._open.append(name if is_core else tag)
         if not is_core:
             if parent == "object" or (parent == "mesh" and name in ("beamlattice", "displacementmesh")):
                 self._object.shape = name
         elif name == "vertex" and parent == "vertices":
-            self._vertices += self._values(attributes, "x", "y", "z")
+            self._vertices.add(self._values(attributes, "x", "y", "z"), self._here)
         elif name == "triangle" and parent == "triangles":
-            self._triangles += self._values(attributes, "v1", "v2", "v3")
+            self._triangles.add(self._values(attributes, "v1", "v2", "v3"), self._here)
         elif name == "model" and not parent:
             self._has_model = True
             self._check_extensions(attributes.get("requiredextensions", ""))
@@ -95,6 +136,8 @@ class Part(Handler):
             self._here = f"object {key:.40}"
             self._object = self.objects[key] = Object(f"{self._place}: {self._here}")
         elif name == "mesh" and parent == "object":
+            if self._object.has_mesh:
+                raise ValueError(f"{self._here}: has a second mesh: the file is damaged")
             self._object.has_mesh = True
         elif name == "component" and parent == "components":
             self._object.components.append(self._reference(attributes, "component"))
@@ -104,18 +147,16 @@ class Part(Handler):
     def end(self, tag: str) -> None:
         """Finish an object's mesh."""
         if self._open.pop() == "mesh" and self._open and self._open[-1] == "object":
-            points = self._numbers(self._vertices, self._here).reshape(-1, 3)
-            corners = self._numbers(self._triangles, self._here).reshape(-1, 3)
+            points, corners = self._vertices.take(self._here), self._triangles.take(self._here)
             wrong = ~((corners >= 0) & (corners < len(points)) & (corners % 1 == 0)).all(axis=1)
             if wrong.any():
                 row = int(np.argmax(wrong))
-                found = " ".join(self._triangles[3 * row : 3 * row + 3])
+                found = " ".join(f"{corner:.15g}" for corner in corners[row].tolist())
                 raise ValueError(
-                    f"{self._here}: triangle {row}: expected indices below {len(points)}, found {found:.60}: "
+                    f"{self._here}: triangle {row}: expected indices below {len(points)}, found {found}: "
                     "the file is damaged"
                 )
             self._object.vertices, self._object.triangles = points, corners.astype(np.int32)
-            self._vertices, self._triangles = [], []
 
     def _values(self, attributes: Attributes, *keys: str) -> list[str]:
         try:
@@ -126,22 +167,12 @@ class Part(Handler):
                 f"line {self.line()}: {element}: expected an attribute {error}: the file is damaged"
             ) from None
 
-    def _numbers(self, words: list[str], place: str) -> NDArray[np.float64]:
-        try:
-            numbers = floats(words)
-        except ValueError as error:
-            raise ValueError(f"{place}: {error}: the file is damaged") from None
-        if not np.isfinite(numbers).all():
-            found = words[int(np.argmin(np.isfinite(numbers)))]
-            raise ValueError(f"{place}: expected finite numbers, found {found!r:.40}")
-        return numbers
-
     def _reference(self, attributes: Attributes, what: str) -> Reference:
         here = f"line {self.line()}: {what}"
         (key,) = self._values(attributes, "objectid")
         matrix = IDENTITY
         if "transform" in attributes:
-            numbers = self._numbers(attributes["transform"].split(), f"{here}: transform")
+            numbers = finite(attributes["transform"].split(), f"{here}: transform")
             if len(numbers) != 12:
                 raise ValueError(f"{here}: transform: expected 12 numbers, found {len(numbers)}")
             matrix = np.eye(4)
