@@ -19,7 +19,7 @@ from wive._internal.precision import FLOAT32, Floats, Real, real_named
 # Readers of formats that may be text.
 TEXT = ("obj", "off", "ply", "stl")
 # Modules of other readers.
-OTHERS = {"npz": "npz", "3mf": "threemf", "dae": "dae"}
+OTHERS = {"npz": "npz", "3mf": "threemf.reader", "dae": "dae.reader"}
 # Vertices and triangles are numbered by int32.
 MOST = 2**31 - 1
 
@@ -83,7 +83,7 @@ def _content(source: MeshSource) -> tuple[str, str | None, bytes]:
 def _read(kind: str, data: bytes, name: str, folder: str | None, real: Real) -> Mesh:
     """Import the reader of this kind and run it."""
     if kind in ("gltf", "glb", "vrm"):
-        from wive._internal.formats import gltf
+        from wive._internal.formats.gltf import reader as gltf
 
         return gltf.read(data, name, folder)
     if kind in OTHERS:

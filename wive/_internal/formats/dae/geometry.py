@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from wive._internal.formats.dae_tree import Document, Element
+from wive._internal.formats.dae.tree import Document, Element
 from wive._internal.formats.triangulate import triangulate
 
 PRIMITIVES = ("triangles", "polylist", "polygons", "tristrips", "trifans")

@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from wive._internal.formats.gltf_accessors import describe
-from wive._internal.formats.gltf_container import Document
-from wive._internal.formats.gltf_fields import Fields, index_of, members, whole
+from wive._internal.formats.gltf.accessors import describe
+from wive._internal.formats.gltf.document import Document
+from wive._internal.formats.gltf.fields import Fields, index_of, members, whole
 
 NAME = "KHR_draco_mesh_compression"
 TRIANGLES = 4

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wive._internal.archives import MOST_INFLATION
-from wive._internal.formats.gltf_container import Document
-from wive._internal.formats.gltf_fields import Fields, index_of, short, whole
+from wive._internal.formats.gltf.document import Document
+from wive._internal.formats.gltf.fields import Fields, index_of, short, whole
 from wive._internal.formats.placing import MOST
 
 COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}

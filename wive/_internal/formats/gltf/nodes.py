@@ -11,9 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wive._internal.formats.gltf_accessors import describe, values
-from wive._internal.formats.gltf_container import Document
-from wive._internal.formats.gltf_fields import (
+from wive._internal.formats.gltf.accessors import describe, values
+from wive._internal.formats.gltf.document import Document
+from wive._internal.formats.gltf.fields import (
     Fields,
     index_of,
     indices,

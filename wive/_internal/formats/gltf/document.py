@@ -15,7 +15,7 @@ from urllib.parse import unquote, unquote_to_bytes
 
 from numpy.typing import NDArray
 
-from wive._internal.formats.gltf_fields import Fields, listed, members, short, whole
+from wive._internal.formats.gltf.fields import Fields, listed, members, short, whole
 
 JSON_CHUNK, BIN_CHUNK = 0x4E4F534A, 0x004E4942
 # Buffer views that only a decoder can read, unless their buffer has the data in plain form as well.

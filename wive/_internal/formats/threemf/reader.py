@@ -18,7 +18,7 @@ from wive._internal.archives import Archive
 from wive._internal.formats import Mesh
 from wive._internal.formats.named import named
 from wive._internal.formats.placing import IDENTITY, Matrix, check_counts, joined
-from wive._internal.formats.threemf_part import Object, Part, Reference
+from wive._internal.formats.threemf.part import Object, Part, Reference
 from wive._internal.formats.xml_events import Attributes, Handler, parse
 
 MODEL = "http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel"

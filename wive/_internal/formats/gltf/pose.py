@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wive._internal.formats.gltf_accessors import describe, values
-from wive._internal.formats.gltf_container import Document
-from wive._internal.formats.gltf_fields import Fields, index_of, indices, members, numbers, objects
-from wive._internal.formats.gltf_nodes import Scene
+from wive._internal.formats.gltf.accessors import describe, values
+from wive._internal.formats.gltf.document import Document
+from wive._internal.formats.gltf.fields import Fields, index_of, indices, members, numbers, objects
+from wive._internal.formats.gltf.nodes import Scene
 from wive._internal.formats.placing import moved
 
 Doubles = NDArray[np.float64]

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wive._internal.formats import Mesh
-from wive._internal.formats.dae_geometry import Geometry, read_geometry
-from wive._internal.formats.dae_tree import Document, Element
+from wive._internal.formats.dae.geometry import Geometry, read_geometry
+from wive._internal.formats.dae.tree import Document, Element
 from wive._internal.formats.named import named
 from wive._internal.formats.placing import IDENTITY, Matrix, check_counts, joined
 

@@ -14,12 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wive._internal.formats import Mesh
-from wive._internal.formats.gltf_accessors import Accessor, describe, values
-from wive._internal.formats.gltf_container import Document
-from wive._internal.formats.gltf_draco import is_compressed, unpack
-from wive._internal.formats.gltf_fields import Fields, index_of, members, objects, whole
-from wive._internal.formats.gltf_nodes import Drawn, Scene
-from wive._internal.formats.gltf_pose import default_weights, joint_matrices, morphed, skinned
+from wive._internal.formats.gltf.accessors import Accessor, describe, values
+from wive._internal.formats.gltf.document import Document
+from wive._internal.formats.gltf.draco import is_compressed, unpack
+from wive._internal.formats.gltf.fields import Fields, index_of, members, objects, whole
+from wive._internal.formats.gltf.nodes import Drawn, Scene
+from wive._internal.formats.gltf.pose import default_weights, joint_matrices, morphed, skinned
 from wive._internal.formats.named import named
 from wive._internal.formats.placing import IDENTITY, Matrix, check_counts, joined
 

@@ -1,0 +1,1 @@
+"""COLLADA: reader, tree of elements, geometries."""

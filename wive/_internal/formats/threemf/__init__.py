@@ -1,0 +1,1 @@
+"""3MF: reader of packages, model parts."""
