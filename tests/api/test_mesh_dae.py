@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from support.dae_files import document, draw, geometry, node, primitive
+from support.refusals import refusal
 
 import wive
 
@@ -20,16 +21,12 @@ def heights(text: str) -> list[float]:
     return vertices[faces][::2, 0, 2].tolist()
 
 
+def refused(text: str) -> str:
+    return refusal(text.encode(), "dae")
+
+
 def up(z: float) -> str:
     return f"<translate>0 0 {z}</translate>"
-
-
-def refusal(text: str) -> str:
-    with pytest.raises(ValueError) as error:
-        mesh(text)
-    message = str(error.value)
-    assert "\n" not in message and message.startswith("mesh (bytes): ")
-    return message.removeprefix("mesh (bytes): ")
 
 
 def test_geometries_come_in_the_order_of_the_nodes_each_with_all_its_vertices():
@@ -211,24 +208,24 @@ def test_cameras_and_what_the_scene_does_not_use_may_be_anything():
     ],
 )
 def test_what_a_document_gets_wrong_is_named(geometries, nodes, expected):
-    assert expected in refusal(document(geometries, nodes))
+    assert expected in refused(document(geometries, nodes))
 
 
 def test_damaged_documents_are_refused():
     text = document(SQUARE, DRAWN)
-    assert "line 5: expected XML (unclosed token): the file is cut off or damaged" in refusal(text[:-9])
-    assert "line 1: expected XML" in refusal("no XML")
-    assert "line 1: expected an element 'COLLADA', found 'svg'" in refusal("<svg/>")
-    assert "has no scene" in refusal(text.replace("<scene>", "<other>").replace("</scene>", "</other>"))
-    assert "document type declaration" in refusal(text.replace("\n", "\n<!DOCTYPE a>", 1))
+    assert "line 5: expected XML (unclosed token): the file is cut off or damaged" in refused(text[:-9])
+    assert "line 1: expected XML" in refused("no XML")
+    assert "line 1: expected an element 'COLLADA', found 'svg'" in refused("<svg/>")
+    assert "has no scene" in refused(text.replace("<scene>", "<other>").replace("</scene>", "</other>"))
+    assert "document type declaration" in refused(text.replace("\n", "\n<!DOCTYPE a>", 1))
 
 
 def test_copies_beyond_the_range_of_indices_are_refused_before_they_are_made():
     twice = [node(f'<instance_node url="#n{n}"/>' * 2, key=f"n{n + 1}") for n in range(60)]
     text = document(SQUARE, '<instance_node url="#n60"/>', node(draw("a"), key="n0") + "".join(twice))
-    assert f"has {5 * 2**60} vertices and {2 * 2**60} triangles" in refusal(text)
+    assert f"has {5 * 2**60} vertices and {2 * 2**60} triangles" in refused(text)
     empty = document("", '<instance_node url="#n60"/>', node(key="n0") + "".join(twice))
-    assert "has no triangles" in refusal(empty)
+    assert "has no triangles" in refused(empty)
 
 
 def test_nodes_nested_twenty_thousand_deep_are_read():

@@ -6,6 +6,11 @@ from typing import Any
 
 import numpy as np
 
+import wive
+
+SQUARE = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], np.float32)
+LISTED = [0, 1, 2, 0, 2, 3]
+CORNERS = SQUARE[LISTED].reshape(2, 3, 3)
 KINDS = {"i1": 5120, "u1": 5121, "i2": 5122, "u2": 5123, "u4": 5125, "f4": 5126}
 TYPES = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4", 16: "MAT4"}
 
@@ -97,3 +102,14 @@ def compressed(data: bytes = b"DRACO", count: int = 4, triangles: int = 2, mode:
     model.node(mesh=model.mesh(primitive(position, indices, mode=mode, extensions=extensions)))
     model.json["extensionsRequired"] = ["KHR_draco_mesh_compression"]
     return model
+
+
+def square(dtype: str = "u2") -> tuple[Model, int, int]:
+    """A model with a square's positions and indices, in accessors 0 and 1, and no mesh."""
+    model = Model()
+    return model, model.array(SQUARE, "f4"), model.array(LISTED, dtype)
+
+
+def corners(data: bytes, dtype=np.float64) -> np.ndarray:
+    vertices, faces = wive.load_mesh(data, dtype)
+    return vertices[faces]
