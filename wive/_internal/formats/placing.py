@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from itertools import groupby
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,9 @@ from wive._internal.formats import Mesh
 
 Matrix = NDArray[np.float64]
 IDENTITY = np.eye(4)
+# Vertices (n,3), corners (f,3) and matrices (k,4,4) of the k copies of a mesh.
+Part = tuple[NDArray[Any], NDArray[np.int32], Matrix]
+BATCH = 1 << 16  # vertices placed at once: their coordinates stay in the cache
 MOST = 2**31 - 1  # vertices and triangles are numbered by int32
 
 
@@ -21,17 +25,16 @@ def check_counts(vertices: int, triangles: int) -> None:
         raise ValueError(f"scene: has {vertices} vertices and {triangles} triangles, expected at most {MOST}")
 
 
-def joined(parts: Iterable[tuple[NDArray[Any], NDArray[np.int32], Matrix]]) -> Mesh:
-    """Vertices and faces of all parts in order, each of vertices (n,3), corners (f,3) and matrices (k,4,4).
+def joined(parts: Iterable[Part]) -> Mesh:
+    """Vertices and faces of all parts in order, each with a copy per matrix.
 
-    A part has a copy per matrix. A mirrored copy turns the other side of its triangles out: their corners 1
-    and 2 change places, so that normals point as they do in the mesh. Vertices are float32 if all parts' are
-    and no matrix moves them.
+    A mirrored copy turns the other side of its triangles out: their corners 1 and 2 change places, so that
+    normals point as they do in the mesh. Vertices are float32 if all parts' are and no matrix moves them.
     """
     vertices: list[NDArray[Any]] = [np.empty((0, 3), np.float32)]
     faces = [np.empty((0, 3), np.int32)]
     start = 0
-    for points, corners, matrices in parts:
+    for points, corners, matrices in together(parts):
         vertices.append(placed(points, matrices).reshape(-1, 3))
         mirrored = np.linalg.det(matrices[:, :3, :3]) < 0
         copies = np.where(mirrored[:, None, None], corners[:, [0, 2, 1]], corners)
@@ -39,6 +42,17 @@ def joined(parts: Iterable[tuple[NDArray[Any], NDArray[np.int32], Matrix]]) -> M
         faces.append((copies + starts[:, None, None]).reshape(-1, 3))
         start += len(vertices[-1])
     return np.concatenate(vertices), np.concatenate(faces)
+
+
+def together(parts: Iterable[Part]) -> Iterator[Part]:
+    """The parts, with copies of one mesh that follow each other as one part, of BATCH vertices or so."""
+    for _, same in groupby(parts, key=lambda part: (id(part[0]), id(part[1]))):
+        first, *rest = same
+        points, corners, _ = first
+        matrices = np.concatenate([part[2] for part in (first, *rest)])
+        some = max(1, BATCH // max(1, len(points)))
+        for at in range(0, len(matrices), some):
+            yield points, corners, matrices[at : at + some]
 
 
 def placed(positions: NDArray[Any], matrices: Matrix) -> NDArray[Any]:

@@ -21,7 +21,7 @@ from wive._internal.formats.gltf.fields import Fields, index_of, members, object
 from wive._internal.formats.gltf.nodes import Drawn, Scene
 from wive._internal.formats.gltf.pose import default_weights, joint_matrices, morphed, skinned
 from wive._internal.formats.named import named
-from wive._internal.formats.placing import IDENTITY, Matrix, check_counts, joined
+from wive._internal.formats.placing import IDENTITY, Part, check_counts, joined
 
 LISTS, FAN = 4, 6  # modes; 5 is a strip
 Shape = tuple[NDArray[Any], NDArray[np.int32]]  # positions and corners of a primitive, in its mesh
@@ -52,49 +52,63 @@ def read(data: bytes, name: str, folder: str | None) -> Mesh:
 
 def _read(document: Document) -> Mesh:
     scene = Scene(document)
-    meshes: dict[int, list[Primitive]] = {}
-    vertex_count = face_count = 0
-    for drawn in scene.drawn:
-        if drawn.mesh not in meshes:
-            meshes[drawn.mesh] = list(primitives(document, drawn.mesh, drawn.place))
-        vertex_count += sum(one.positions.count for one in meshes[drawn.mesh]) * len(drawn.matrices)
-        face_count += sum(one.triangles for one in meshes[drawn.mesh]) * len(drawn.matrices)
-    check_counts(vertex_count, face_count)
-    shapes: dict[int, list[Shape]] = {}
-    return joined(draw(document, scene, meshes, shapes, drawn) for drawn in scene.drawn)
+    meshes = Meshes(document, scene)
+    sizes = [(meshes.size(drawn), len(drawn.matrices)) for drawn in scene.drawn]
+    check_counts(
+        sum(vertices * copies for (vertices, _), copies in sizes),
+        sum(triangles * copies for (_, triangles), copies in sizes),
+    )
+    return joined(meshes.part(drawn) for drawn in scene.drawn)
 
 
-def draw(
-    document: Document,
-    scene: Scene,
-    meshes: dict[int, list[Primitive]],
-    shapes: dict[int, list[Shape]],
-    drawn: Drawn,
-) -> tuple[NDArray[Any], NDArray[np.int32], Matrix]:
-    """Vertices (n,3), corners (f,3) and matrices (k,4,4) of the k copies of a mesh that a node draws."""
-    mesh = meshes[drawn.mesh]
-    if drawn.mesh not in shapes:
-        shapes[drawn.mesh] = [(points(document, one), triangles(document, one)) for one in mesh]
-    weights = default_weights(document.item("meshes", drawn.mesh, drawn.place), drawn.node, drawn.place)
-    posed = [
-        morphed(document, rest, one.fields, weights, one.place)
-        for one, (rest, _) in zip(mesh, shapes[drawn.mesh], strict=True)
-    ]
-    starts = np.cumsum([0, *map(len, posed)], dtype=np.int32)
-    corners = [corners + start for (_, corners), start in zip(shapes[drawn.mesh], starts[:-1], strict=True)]
-    matrices = drawn.matrices
-    skin = index_of(drawn.node, "skin", drawn.place)
-    if skin is not None:  # joints move the vertices to the world, whatever moves the node
-        joints = joint_matrices(document, scene, skin, drawn.place)
-        posed = [
-            skinned(document, rest, one.fields, joints, one.place)
-            for one, rest in zip(mesh, posed, strict=True)
-        ]
-        if (np.linalg.det(joints[:, :3, :3]) < 0).all():
-            corners = [triangle[:, [0, 2, 1]] for triangle in corners]
-        matrices = IDENTITY[None]
-    nothing: Shape = (np.empty((0, 3), np.float32), np.empty((0, 3), np.int32))
-    return np.concatenate([nothing[0], *posed]), np.concatenate([nothing[1], *corners]), matrices
+class Meshes:
+    """The meshes of a document, each read once."""
+
+    def __init__(self, document: Document, scene: Scene) -> None:
+        """Read nothing yet."""
+        self._document, self._scene = document, scene
+        self._primitives: dict[int, list[Primitive]] = {}
+        self._shapes: dict[int, list[Shape]] = {}  # at rest, one per primitive
+        self._rigid: dict[int, Shape] = {}  # whole meshes that no node poses
+
+    def size(self, drawn: Drawn) -> tuple[int, int]:
+        """Vertices and triangles of the mesh that a node draws."""
+        if drawn.mesh not in self._primitives:
+            self._primitives[drawn.mesh] = list(primitives(self._document, drawn.mesh, drawn.place))
+        found = self._primitives[drawn.mesh]
+        return sum(one.positions.count for one in found), sum(one.triangles for one in found)
+
+    def part(self, drawn: Drawn) -> Part:
+        """Vertices (n,3), corners (f,3) and matrices (k,4,4) of the k copies of a mesh that a node draws."""
+        if "skin" in drawn.node:  # joints move the vertices to the world, whatever moves the node
+            return *self._posed(drawn), IDENTITY[None]
+        if "weights" in drawn.node:
+            return *self._posed(drawn), drawn.matrices
+        if drawn.mesh not in self._rigid:
+            self._rigid[drawn.mesh] = self._posed(drawn)
+        return *self._rigid[drawn.mesh], drawn.matrices
+
+    def _posed(self, drawn: Drawn) -> Shape:
+        """The mesh by the node's or its own weights and by the node's skin."""
+        document, mesh = self._document, self._primitives[drawn.mesh]
+        if drawn.mesh not in self._shapes:
+            self._shapes[drawn.mesh] = [(points(document, one), triangles(document, one)) for one in mesh]
+        skin = index_of(drawn.node, "skin", drawn.place)
+        joints = None if skin is None else joint_matrices(document, self._scene, skin, drawn.place)
+        weights = default_weights(document.item("meshes", drawn.mesh, drawn.place), drawn.node, drawn.place)
+        vertices: list[NDArray[Any]] = [np.empty((0, 3), np.float32)]
+        corners = [np.empty((0, 3), np.int32)]
+        start = 0
+        for one, (rest, listed) in zip(mesh, self._shapes[drawn.mesh], strict=True):
+            moved = morphed(document, rest, one.fields, weights, one.place)
+            vertices.append(
+                moved if joints is None else skinned(document, moved, one.fields, joints, one.place)
+            )
+            corners.append(listed + np.int32(start))
+            start += len(rest)
+        mirrored = joints is not None and (np.linalg.det(joints[:, :3, :3]) < 0).all()
+        order = [0, 2, 1] if mirrored else [0, 1, 2]
+        return np.concatenate(vertices), np.concatenate(corners)[:, order]
 
 
 def primitives(document: Document, mesh: int, place: str) -> Iterator[Primitive]:
