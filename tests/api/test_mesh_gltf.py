@@ -156,40 +156,6 @@ def test_instances_on_the_gpu_are_instances():
     assert faces.tolist() == [[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7], [8, 10, 9], [8, 11, 10]]
 
 
-def test_default_weights_move_morph_targets():
-    model, position, indices = square()
-    up, aside = model.array(SQUARE * 0 + [0, 0, 1], "f4"), model.array(SQUARE * 0 + [1, 0, 0], "f4")
-    targets = [{"POSITION": up}, {"NORMAL": up}, {"POSITION": aside}]
-    mesh = model.mesh(primitive(position, indices, targets=targets), weights=[0.5, 1, 0])
-    model.node(mesh=mesh)
-    model.node(mesh=mesh, weights=[0, 0, 2])
-    model.node(mesh=mesh, weights=[0, 0, 0])
-    vertices = wive.load_mesh(model.glb())[0]
-    assert (
-        vertices.tolist()
-        == np.concatenate([np.add(SQUARE, [0, 0, 0.5]), np.add(SQUARE, [2, 0, 0]), SQUARE]).tolist()
-    )
-
-
-def test_skins_are_in_the_pose_of_their_joints():
-    model, position, indices = square()
-    joints = model.array([[0, 0, 0, 0], [1, 0, 0, 0], [1, 0, 0, 0], [0, 1, 9, 9]], "u1")
-    weights = model.array(
-        [[255, 0, 0, 0], [255, 0, 0, 0], [255, 0, 0, 0], [51, 204, 0, 0]], "u1", normalized=True
-    )
-    bind = np.tile(np.eye(4), (2, 1, 1))
-    bind[1, :3, 3] = [0, 0, -3]
-    bound = model.array(bind.transpose(0, 2, 1).reshape(2, 16), "f4")
-    attributes = {"POSITION": position, "JOINTS_0": joints, "WEIGHTS_0": weights}
-    mesh = model.mesh({"attributes": attributes, "indices": indices})
-    tip = model.node(root=False, translation=[0, 0, 5])
-    hip = model.node(translation=[0, 0, 1], children=[tip])
-    model.json["skins"] = [{"joints": [hip, tip], "inverseBindMatrices": bound}]
-    model.node(mesh=mesh, skin=0, translation=[1000, 0, 0])  # has no say: joints do
-    vertices = wive.load_mesh(model.glb(), np.float64)[0]
-    assert np.abs(vertices - np.add(SQUARE, [[0, 0, 1], [0, 0, 3], [0, 0, 3], [0, 0, 2.6]])).max() < 1e-12
-
-
 def test_instances_with_attributes_of_their_own_alone_are_copies_in_place():
     model, position, indices = square()
     instancing = {"attributes": {"_ID": model.array([5, 6, 7], "u2")}}
@@ -198,6 +164,17 @@ def test_instances_with_attributes_of_their_own_alone_are_copies_in_place():
     assert corners(model.glb()).tolist() == np.tile(CORNERS, (3, 1, 1)).tolist()
     instancing["attributes"]["SCALE"] = model.array(np.ones((2, 3)), "f4")
     assert "EXT_mesh_gpu_instancing: expected attributes of one count, found [2, 3]" in refusal(model.glb())
+
+
+def test_many_copies_keep_their_order():
+    model, position, indices = square()
+    steps = np.arange(3 * 40_000).reshape(-1, 3)
+    instancing = {"attributes": {"TRANSLATION": model.array(steps, "f4")}}
+    model.node(
+        mesh=model.mesh(primitive(position, indices)), extensions={"EXT_mesh_gpu_instancing": instancing}
+    )
+    expected = CORNERS[None] + steps[:, None, None, :]
+    assert (corners(model.glb()) == expected.reshape(-1, 3, 3)).all()
 
 
 def test_hidden_nodes_are_left_out():

@@ -97,6 +97,25 @@ def test_sparse_values_replace_rows_of_a_view_or_of_zeros(dtype, based):
     assert wive.load_mesh(model.glb())[0].tolist() == expected
 
 
+@pytest.mark.parametrize(
+    ("rows", "dtype", "expected"),
+    [
+        ([2, 1], "u1", "expected ascending numbers below 4"),
+        ([1, 1], "u2", "expected ascending numbers below 4"),
+        ([1, 4], "u4", "expected ascending numbers below 4"),
+        ([1, 2], "i2", "componentType: expected unsigned integers, found 5122"),
+    ],
+)
+def test_sparse_values_without_a_row_of_their_own_are_refused(rows, dtype, expected):
+    model = Model()
+    position, kind = model.array(SQUARE, "f4"), {"u1": 5121, "u2": 5123, "u4": 5125, "i2": 5122}[dtype]
+    indices = {"bufferView": model.view(np.array(rows, f"<{dtype}").tobytes()), "componentType": kind}
+    values = {"bufferView": model.view(np.zeros((2, 3), "<f4").tobytes())}
+    model.json["accessors"][position]["sparse"] = {"count": 2, "indices": indices, "values": values}
+    model.node(mesh=model.mesh(primitive(position, model.array(LISTED, "u1"))))
+    assert refusal(model.glb()).startswith(f"accessors[0]: sparse: indices: {expected}")
+
+
 def test_sparse_indices_of_triangles_are_read():
     model = Model()
     position, indices = model.array(SQUARE, "f4"), model.array([0, 1, 2, 0, 0, 0], "u1")

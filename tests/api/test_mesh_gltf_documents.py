@@ -246,6 +246,17 @@ def change(model: Model, path: str, value: object) -> None:
         ("nodes/0/children", [0], "nodes[0]: is reached a second time, by nodes[0]"),
         ("nodes/0/matrix", [1, 0, 0], "nodes[0]: matrix: expected 16 finite numbers"),
         ("nodes/0/matrix", [0] * 16, "nodes[0]: matrix: expected a last row of 0 0 0 1"),
+        (
+            "nodes/0",
+            {"mesh": 0, "matrix": [1] * 16, "scale": [1, 1, 1]},
+            "nodes[0]: has both matrix and scale",
+        ),
+        (
+            "nodes/0/extensions",
+            {"KHR_node_visibility": {"visible": 0}},
+            "nodes[0]: KHR_node_visibility: visible: expected",
+        ),
+        ("nodes/0/extensions", [], "nodes[0]: extensions: expected an object, found []"),
         ("nodes/0/rotation", [0, 0, 0, 0], "nodes[0]: rotation: expected a quaternion of length 1"),
         ("nodes/0/scale", [10**400, 1, 1], "nodes[0]: scale: expected 3 finite numbers"),
         ("nodes/0/skin", 0, "nodes[0]: refers to skins[0]"),
