@@ -5,8 +5,10 @@ from __future__ import annotations
 from bisect import bisect_left, bisect_right
 from collections import deque
 
-# Corners looked at, over all ears of a polygon: some seconds. Outlines of 100,000 corners need a tenth.
+# Of a polygon, in corners looked at: some seconds. Outlines of 100,000 corners need a third.
 MOST_WORK = 30_000_000
+# What is done for each corner, and for each triangle that may be an ear, takes as long as looking at so many.
+WORK_PER_CORNER, WORK_PER_EAR = 50, 20
 
 Triangles = list[tuple[int, int, int]]
 
@@ -51,6 +53,7 @@ class _Ring:
         self.is_gone = [False] * count
         self.some = 0
         self._work = 0
+        self._spend(WORK_PER_CORNER * count)
         # Corners that are not convex: others are inside of no ear, and cutting ears makes no more of them.
         self.blocks = [self._turn(self.before[i], i, self.after[i]) <= 0 for i in range(count)]
         self._sort([i for i in range(count) if self.blocks[i]])
@@ -72,11 +75,7 @@ class _Ring:
         (au, av), (bu, bv), (cu, cv) = places = [(u[i], v[i]) for i in triangle]
         first = bisect_left(self._sorted_u, min(au, bu, cu))
         last = bisect_right(self._sorted_u, max(au, bu, cu))
-        self._work += last - first
-        if self._work > MOST_WORK:
-            raise Tangled(
-                f"a polygon of {len(u):,} corners is too tangled: triangulate the mesh before it is exported"
-            )
+        self._spend(WORK_PER_EAR + last - first)
         for i in self._order[first:last]:
             if not self.blocks[i]:
                 continue
@@ -90,6 +89,12 @@ class _Ring:
             ):
                 return False
         return True
+
+    def _spend(self, work: int) -> None:
+        self._work += work
+        if self._work > MOST_WORK:
+            what = f"a polygon of {len(self._u):,} corners is too tangled"
+            raise Tangled(f"{what}: triangulate the mesh before it is exported")
 
     def cut(self, corner: int) -> None:
         """Take a corner out."""

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wive._internal.formats import Mesh
-from wive._internal.formats.text import JOINED, Bools, Ints, Text, plain
+from wive._internal.formats.text import COMMENT, JOINED, Bools, Ints, Text, plain
 from wive._internal.formats.triangulate import triangulate
 
 SKIPPED = frozenset(
@@ -29,10 +29,10 @@ REFUSED = {
     b"call": "another file's statements",
     b"csh": "a command",
 }
-# Numbers of a vertex: x y z, with a weight, with a colour, with both or with a colour of four.
-NUMBERS = (3, 4, 6, 7)
+# Numbers of a vertex: x y z, with a weight, with a colour, with both; a colour may have four.
+NUMBERS = (3, 4, 6, 7, 8)
 # A name may end in a backslash, as folders do: it continues no line.
-NAME_LINE = re.compile(rb"^([ \t]*(?:mtllib|usemtl|o|g)[ \t][^\n]*?)\\+[ \t]*$", re.MULTILINE)
+NAME_LINE = re.compile(rb"[ \t]*(?:mtllib|usemtl|o|g)[ \t]")
 CONTINUATION = re.compile(rb"\\[ \t]*\n")
 CORNER_BYTES = np.zeros(256, bool)
 CORNER_BYTES[list(b"0123456789+-/")] = True
@@ -42,16 +42,25 @@ def read(data: bytes, name: str, dtype: np.dtype[Any]) -> Mesh:
     """Vertices of this dtype and triangles."""
     data = plain(data, name)
     if b"#" in data:
-        data = re.sub(rb"#[^\n]*", b"", data)
-    if CONTINUATION.search(data):
-        data = CONTINUATION.sub(JOINED, NAME_LINE.sub(rb"\1", data))
-    text = Text(data, name)
+        data = COMMENT.sub(b"", data)
+    text = Text(_joined(data) if b"\\" in data else data, name)
     is_vertex = text.same(text.heads, b"v")
     is_face = text.same(text.heads, b"f") | text.same(text.heads, b"fo")
     _check_others(text, text.heads[~(is_vertex | is_face)])
     vertices = _vertices(text, is_vertex, dtype)
     corners, sizes = _corners(text, text.heads[is_vertex], is_face)
     return vertices, triangulate(vertices, sizes, corners, name)
+
+
+def _joined(data: bytes) -> bytes:
+    """Join lines that end in a backslash with the next ones."""
+    kept, done = [], 0
+    for found in CONTINUATION.finditer(data):
+        begin = data.rfind(b"\n", 0, found.start()) + 1
+        is_name = NAME_LINE.match(data, begin, found.start())
+        kept += [data[done : found.start()], b"\n" if is_name else JOINED]
+        done = found.end()
+    return b"".join([*kept, data[done:]])
 
 
 def _check_others(text: Text, heads: Ints) -> None:
@@ -65,7 +74,9 @@ def _check_others(text: Text, heads: Ints) -> None:
                 head, f"`{keyword.decode()}`, {REFUSED[keyword]}, is not read: export the mesh as polygons"
             )
         if keyword not in SKIPPED:
-            raise text.error(head, f"expected a statement such as `v` or `f`, got {text.quoted(head)}")
+            raise text.error(
+                head, f"expected a statement of OBJ, got {text.quoted(head)}: comments begin with #"
+            )
 
 
 def _vertices(text: Text, is_vertex: Bools, dtype: np.dtype[Any]) -> NDArray[Any]:
@@ -74,7 +85,7 @@ def _vertices(text: Text, is_vertex: Bools, dtype: np.dtype[Any]) -> NDArray[Any
     if wrong.size:
         row = wrong[0]
         raise text.error(
-            int(heads[row]), f"expected 3 numbers, 4 with a weight or 6 to 7 with a colour, got {counts[row]}"
+            int(heads[row]), f"expected 3 numbers, 4 with a weight or 6 to 8 with a colour, got {counts[row]}"
         )
     for more in np.unique(counts[counts > 3]):
         text.reals(heads[counts == more, None] + np.arange(4, more + 1), np.dtype(np.float64))

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from wive._internal.formats import Mesh
-from wive._internal.formats.text import Text, plain
+from wive._internal.formats.text import COMMENT, Text, plain
 from wive._internal.formats.triangulate import triangulate
 
 # ModelNet's files have no space behind OFF.
@@ -20,7 +20,7 @@ def read(data: bytes, name: str, dtype: np.dtype[Any]) -> Mesh:
     header = HEADER.match(data[:1000]) if b"BINARY" in data[:1000] else None
     if header and header[4]:
         raise ValueError(f"{name}: line 1: binary OFF is not read: save the mesh as text, or as PLY")
-    data = re.sub(rb"#[^\n]*", b"", plain(data, name))
+    data = COMMENT.sub(b"", plain(data, name))
     header = HEADER.match(data)
     if not header:
         raise Text(data, name).error(0, "expected a header such as OFF, COFF or NOFF")

@@ -11,7 +11,7 @@ from wive._internal.formats import Mesh
 from wive._internal.formats.ply_binary import BinaryRows
 from wive._internal.formats.ply_header import Element, Property, read_header
 from wive._internal.formats.ply_text import TextRows
-from wive._internal.formats.text import Ints
+from wive._internal.formats.text import Ints, unmarked
 from wive._internal.formats.triangulate import triangulate
 
 AXES = ("x", "y", "z")
@@ -22,6 +22,7 @@ RESTART = -1
 
 def read(data: bytes, name: str, dtype: np.dtype[Any]) -> Mesh:
     """Vertices, of this dtype in text and of the file's else, and triangles."""
+    data = unmarked(data, name)
     header = read_header(data, name)
     rows: TextRows | BinaryRows
     rows = BinaryRows(data, name, header) if header.order else TextRows(data, name, header)
@@ -31,7 +32,7 @@ def read(data: bytes, name: str, dtype: np.dtype[Any]) -> Mesh:
         table = rows.read(element)
         if element.name == "vertex":
             vertices = table.numbers([_property(element, [axis], name) for axis in AXES], dtype)
-        elif element.name in ("face", "tristrips"):
+        elif element.name in ("face", "tristrips") and element.rows:
             lists.append((element, *table.lists(_property(element, LISTS, name))))
     rows.finish()
     if vertices is None:

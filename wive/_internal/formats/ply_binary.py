@@ -82,7 +82,7 @@ class BinaryRows:
     def _read_even(self, element: Element, table: BinaryTable) -> bool:
         """Read rows whose lists are as long as the first row's; False if they are not."""
         if not element.rows:
-            return not element.has_lists
+            return False
         at = self._at
         for each in element.properties:
             size = 1
@@ -140,8 +140,8 @@ class BinaryRows:
                 raise self._cut(element, row)
         self._at = at
         for each, first, size in zip(element.properties, firsts, sizes, strict=True):
-            table.first[each.name] = np.frombuffer(first, np.int64)
-            table.sizes[each.name] = np.frombuffer(size, np.int64)
+            table.first[each.name] = np.array(first, np.int64)
+            table.sizes[each.name] = np.array(size, np.int64)
 
     def _cut(self, element: Element, row: int) -> ValueError:
         what = f"expected {element.rows:,} rows, as the header has, got the file's end: cut short or damaged"

@@ -8,6 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from wive._internal.formats.text import quoted
+
 TYPES = dict(char="i1", uchar="u1", short="i2", ushort="u2", int="i4", uint="u4", float="f4", double="f8")
 TYPES |= dict(
     int8="i1", uint8="u1", int16="i2", uint16="u2", int32="i4", uint32="u4", float32="f4", float64="f8"
@@ -32,11 +34,6 @@ class Element(NamedTuple):
     properties: list[Property]
 
     @property
-    def has_lists(self) -> bool:
-        """Whether rows differ in size."""
-        return any(each.count_type for each in self.properties)
-
-    @property
     def row_bytes(self) -> int:
         """Bytes per row if its lists are empty: no row has fewer."""
         return sum(np.dtype(each.count_type or each.type).itemsize for each in self.properties)
@@ -56,6 +53,8 @@ def read_header(data: bytes, name: str) -> Header:
     ends = _line_ends(data)
     order: str | None = None
     elements: list[Element] = []
+    names: set[str] = set()
+    property_names: set[str] = set()
     at, number = 0, 0
     while True:
         number += 1
@@ -66,27 +65,30 @@ def read_header(data: bytes, name: str) -> Header:
         words = raw.decode("ascii", "backslashreplace").split()
         if number == 1:
             if words != ["ply"]:
-                raise _error(name, number, "`ply`", f"{_quoted(raw)}: not a PLY file")
+                raise _error(name, number, "`ply`", f"{quoted(raw)}: not a PLY file")
             continue
         match words:
             case [] | ["comment" | "obj_info", *_]:
                 pass
             case _ if not all(map(str.isprintable, words)):
-                raise _error(name, number, "text", f"{_quoted(raw)}: the file is damaged")
+                raise _error(name, number, "text", f"{quoted(raw)}: the file is damaged")
             case ["format", form, "1.0"] if order is None and form in FORMATS:
                 order = FORMATS[form]
             case ["element", element, count] if re.fullmatch(r"\d{1,18}", count):
-                if any(element == other.name for other in elements):
+                if element in names:
                     raise _error(name, number, "one element of a name", f"a second {element!r:.40}")
                 elements.append(Element(element, int(count), []))
+                names.add(element)
+                property_names = set()
             case ["property", *given] if elements and (found := _property(given)):
-                if any(found.name == other.name for other in elements[-1].properties):
+                if found.name in property_names:
                     raise _error(name, number, "one property of a name", f"a second {found.name!r:.40}")
                 elements[-1].properties.append(found)
+                property_names.add(found.name)
             case ["end_header"]:
                 break
             case _:
-                raise _error(name, number, "a line of a PLY header", f"{_quoted(raw)}: the file is damaged")
+                raise _error(name, number, "a line of a PLY header", f"{quoted(raw)}: the file is damaged")
     if order is None:
         raise _error(name, number, f"a line `format` of {', '.join(FORMATS)} 1.0 before", "`end_header`")
     return Header(order, elements, at, number)
@@ -111,10 +113,6 @@ def _line_ends(data: bytes) -> Callable[[int], tuple[int, int] | None]:
         return None if found < 0 else (found, found + len(end))
 
     return find
-
-
-def _quoted(raw: bytes) -> str:
-    return repr(raw[:40].decode("ascii", "backslashreplace"))
 
 
 def _error(name: str, number: int, expected: str, found: str) -> ValueError:

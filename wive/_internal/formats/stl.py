@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from wive._internal.formats import Mesh
 from wive._internal.formats.kinds import is_binary_stl
-from wive._internal.formats.text import Ints, Text, plain
+from wive._internal.formats.text import Ints, Text, plain, quoted
 
 HEADER_BYTES = 84
 FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
@@ -58,7 +58,7 @@ def _text(data: bytes, name: str, dtype: np.dtype[Any]) -> NDArray[Any]:
     data = plain(data, name).lower()
     text = Text(_without_names(data), name)
     if not SOLID_LINE.match(data):
-        raise text.error(0, f"expected `solid`, got {data[:20].decode('ascii', 'backslashreplace')!r}")
+        raise text.error(0, f"expected `solid`, got {quoted(data[:20])}")
     count, rest = divmod(len(text.starts), len(FACET_WORDS))
     words: Ints = np.arange(count * len(FACET_WORDS)).reshape(count, len(FACET_WORDS))
     for facets in (words, np.arange(words.size, len(text.starts))[None]):

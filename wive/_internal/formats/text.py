@@ -24,19 +24,32 @@ MARKS = (
 )
 NUMBER = re.compile(rb"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?|[-+]?(?:nan|inf|infinity)", re.IGNORECASE)
 INTEGER = re.compile(rb"[-+]?\d+")
+# But 1.#INF and 1.#QNAN are how some programs print what is no number.
+COMMENT = re.compile(rb"(?<!\.)#[^\n]*")
 # Words converted at once: their bytes stay in the cache.
 BATCH = 1 << 17
 
 
-def plain(data: bytes, name: str) -> bytes:
-    """The file with lines that end in \\n, without its byte order mark, in one byte per ASCII character."""
+def unmarked(data: bytes, name: str) -> bytes:
+    """The file without its byte order mark, in one byte per ASCII character."""
     for mark, encoding in MARKS:
         if data.startswith(mark):
             try:
                 data = data.decode(encoding).encode()
             except UnicodeError:
                 raise ValueError(f"{name}: begins as {encoding.upper()} text, and is not: damaged") from None
-    data = data.removeprefix(codecs.BOM_UTF8)
+    return data.removeprefix(codecs.BOM_UTF8)
+
+
+def quoted(raw: bytes) -> str:
+    """A piece of a file, as errors quote it."""
+    found = raw.decode("latin-1").strip()
+    return ascii(found if len(found) <= 40 else found[:37] + "...")
+
+
+def plain(data: bytes, name: str) -> bytes:
+    """The file without its byte order mark, with lines that end in \\n; ValueError if it isn't text."""
+    data = unmarked(data, name)
     if b"\r" in data:
         data = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
     if JOINED in data:
@@ -74,8 +87,7 @@ class Text:
         start, end = self.starts[word], self.ends[word]
         if self.heads[np.searchsorted(self.heads, word, side="right") - 1] == word:
             end = self.data.index(b"\n", start)
-        found = self.data[start:end].decode("ascii", "backslashreplace").rstrip()
-        return repr(found if len(found) <= 40 else found[:37] + "...")
+        return quoted(self.data[start:end])
 
     def error(self, word: int, what: str) -> ValueError:
         """An error at the line of this word; that of the last line for one past the last."""

@@ -1,7 +1,7 @@
 """Polygons to triangles: n - 2 of each, in the polygons' order.
 
-A polygon that is star-shaped from its first corner, as every convex one, becomes a fan from there. If it is so
-from its second corner, the fan begins there: no simple quad is left. The rest lose one ear at a time. What
+A polygon that is star-shaped from its first corner, as every convex one, becomes a fan from there. If it is
+so from its second corner, the fan begins there: no simple quad is left. The rest lose one ear at a time. What
 isn't planar is seen along its normal (Newell's). No corner is moved, merged or left out, so neighbours that
 share an edge still do.
 """
