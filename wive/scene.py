@@ -21,7 +21,7 @@ from wive._internal.tracer import Tracer
 from wive.all_hits import AllHits
 from wive.backend import resolve_backend
 from wive.hits import Hits, Stats
-from wive.meshfile import load_mesh
+from wive.meshfile import MeshSource, load_mesh
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
@@ -86,9 +86,16 @@ class Scene:
         self._tracer = _tracer(bvh, self._faces, found, place)
 
     @classmethod
-    def from_file(cls, path: PathLike, *, dtype: DTypeLike = np.float32, **kwargs: Any) -> Scene:
-        """A scene from a mesh file, read by `wive.load_mesh` in that dtype; keywords are those of `Scene`."""
-        return cls(*load_mesh(path, dtype), **kwargs)
+    def from_file(
+        cls,
+        source: MeshSource,
+        *,
+        dtype: DTypeLike = np.float32,
+        file_type: str | None = None,
+        **kwargs: Any,
+    ) -> Scene:
+        """A scene from a mesh file, read by `wive.load_mesh`; other keywords are those of `Scene`."""
+        return cls(*load_mesh(source, dtype, file_type=file_type), **kwargs)
 
     @overload
     def intersect(

@@ -14,7 +14,8 @@ TRIANGLES = [[0, 1, 2], [0, 2, 3], [3, 2, 4]]
 
 OBJ = (
     b"# made by hand\nmtllib a.mtl\no box\nv 0 0 0\nv 1.5 0 0 1\nv 1e-3 .5 -0. 1 0 0\nv 0 1. 2\n\tv 3 3 3\n"
-    b"vt 0 0\nvn 0 0 1\ng a b\nusemtl red\ns 1\nf 1 2 3\nf 1/1 2//1 3/1/1 4\nf -1 -2 -3 \\\n -4 -5\nl 1 2\np 1\n"
+    b"vt 0 0\nvn 0 0 1\ng a b\nusemtl red\ns 1\nf 1 2 3\nf 1/1 2//1 3/1/1 4\n"
+    b"f -1 -2 -3 \\\n -4 -5\nl 1 2\np 1\n"
 )
 OFF = (
     b"# c\nCOFF # x\n5 2 0\n0 0 0 255 0 0 255\n1 0 0 1 1 1 1\n1 1 0 1 1 1 1\n"

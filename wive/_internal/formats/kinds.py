@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import codecs
 import io
 import os
 import re
 import zipfile
+
+from wive._internal.formats.text import COMMENT, MARKS
 
 OBJ_LINE = re.compile(rb"^[ \t]*(?:v|f)[ \t]+[-+.\d]", re.MULTILINE)
 OFF_WORD = re.compile(rb"(?:ST)?C?N?4?n?OFF\b|OFF\d")
@@ -27,7 +30,11 @@ def kind_of(data: bytes, name: str, file_type: str | None) -> str:
 
 def _by_content(data: bytes) -> str:
     """The format that the first bytes show, "" if none."""
-    head = data[:SNIFFED].lstrip(b"\xef\xbb\xbf \t\r\n")
+    head = data[:SNIFFED]
+    encoding = next((encoding for mark, encoding in MARKS if head.startswith(mark)), None)
+    if encoding:
+        head = head.decode(encoding, "ignore").encode()
+    head = head.removeprefix(codecs.BOM_UTF8).lstrip()
     if re.match(rb"ply\s", head):
         return "ply"
     if head.startswith(b"glTF"):
@@ -38,7 +45,7 @@ def _by_content(data: bytes) -> str:
         return "gltf"
     if b"<COLLADA" in head:
         return "dae"
-    if OFF_WORD.match(head):
+    if OFF_WORD.match(COMMENT.sub(b"", head).lstrip()):
         return "off"
     if is_binary_stl(data) or head[:5].lower() == b"solid":
         return "stl"

@@ -50,7 +50,7 @@ class TextRows:
 
     def __init__(self, data: bytes, name: str, header: Header) -> None:
         """Compare the header's counts with the lines that follow it."""
-        self._text = Text(plain(data[header.end :], name), name, header.lines)
+        self._text = Text(plain(data[header.end :], name, header.lines), name, header.lines)
         self._at = 0
         rows = {each.name: each.rows for each in header.elements if each.properties}
         if sum(rows.values()) != len(self._text.heads):

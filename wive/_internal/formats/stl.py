@@ -64,7 +64,8 @@ def _text(data: bytes, name: str, dtype: np.dtype[Any]) -> NDArray[Any]:
     for facets in (words, np.arange(words.size, len(text.starts))[None]):
         _check_keywords(text, facets)
     if rest:
-        raise text.error(len(text.starts), f"expected {FACET_WORDS[rest] or 'a number'}, got the file's end")
+        expected = f"`{FACET_WORDS[rest]}`" if FACET_WORDS[rest] else "a number"
+        raise text.error(len(text.starts), f"expected {expected}, got the file's end")
     return text.reals(words[:, CORNER_WORDS], dtype)
 
 

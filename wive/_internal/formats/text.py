@@ -47,7 +47,7 @@ def quoted(raw: bytes) -> str:
     return ascii(found if len(found) <= 40 else found[:37] + "...")
 
 
-def plain(data: bytes, name: str) -> bytes:
+def plain(data: bytes, name: str, lines_before: int = 0) -> bytes:
     """The file without its byte order mark, with lines that end in \\n; ValueError if it isn't text."""
     data = unmarked(data, name)
     if b"\r" in data:
@@ -55,7 +55,7 @@ def plain(data: bytes, name: str) -> bytes:
     if JOINED in data:
         data = data.replace(JOINED, b" ")
     if b"\0" in data:
-        line = data.count(b"\n", 0, data.index(b"\0")) + 1
+        line = data.count(b"\n", 0, data.index(b"\0")) + 1 + lines_before
         raise ValueError(
             f"{name}: line {line}: expected text, got a zero byte: "
             "the file is damaged, binary, or must be saved as UTF-8"
@@ -169,7 +169,8 @@ class Text:
             if not pattern.fullmatch(found):
                 is_comma = pattern is NUMBER and pattern.fullmatch(found.replace(b",", b".", 1))
                 mend = ": write decimal points, not commas" if is_comma else ""
-                return self.error(word, f"expected {what}, got {self.quoted(word)}{mend}")
+                got = quoted(self.data[self.starts[word] : self.ends[word]])
+                return self.error(word, f"expected {what}, got {got}{mend}")
         raise AssertionError("NumPy refused a list of numbers")
 
     def _rounded(self, values: NDArray[np.float64], words: Ints) -> NDArray[np.float32]:
