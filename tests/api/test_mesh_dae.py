@@ -238,6 +238,12 @@ def test_curves_and_lines_have_no_triangles():
     assert (len(vertices), len(faces)) == (5, 2)
 
 
+def test_vertices_may_be_any_of_the_indices():
+    shape = SQUARE.replace('source="#v" offset="0"', 'source="#v" offset="2"')
+    shape = shape.replace("0 0 1 0 2 0 0 0 2 0 3 0", "4 4 0 4 4 1 4 4 2 4 4 0 4 4 2 4 4 3")
+    assert mesh(document(shape, DRAWN))[1].tolist() == [[0, 1, 2], [0, 2, 3]]
+
+
 def test_inputs_may_share_an_offset_and_ids_may_be_escaped():
     shared = SQUARE.replace('offset="1"', 'offset="0"').replace("0 0 1 0 2 0 0 0 2 0 3 0", "0 1 2\n0 2 3 ")
     assert heights(document(shared, DRAWN)) == [0]
