@@ -1,4 +1,4 @@
-"""Mesh files of every format need no package and give a mesh, or a refusal of one line."""
+"""Files of scenes, damaged in any way, give a mesh or one line; other formats are refused by name."""
 
 import base64
 import io
@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from support import dae_files, threemf_files
 from support.gltf_files import Model, primitive
+from support.mesh_files import damaged
 
 import wive
 
@@ -81,20 +82,12 @@ def dae() -> bytes:
     return dae_files.document(shape, inner + '<instance_node url="#n"/>').encode()
 
 
-def npz(save: Callable[..., None]) -> bytes:
-    file = io.BytesIO()
-    save(file, vertices=POINTS, faces=np.array(FACES, np.int32))
-    return file.getvalue()
-
-
 FILES: dict[str, tuple[str, Callable[[], bytes]]] = {
     "glb": ("glb", lambda: model().glb()),
     "gltf": ("gltf", gltf),
     "3mf": ("3mf", threemf),
     "3mf, stored": ("3mf", threemf_stored),
     "dae": ("dae", dae),
-    "npz": ("npz", lambda: npz(np.savez)),
-    "npz, compressed": ("npz", lambda: npz(np.savez_compressed)),
 }
 
 
@@ -110,30 +103,6 @@ def check_mesh_or_refusal(data: bytes, kind: str) -> bool:
     assert faces.dtype == np.int32 and faces.shape[1:] == (3,)
     assert len(faces) and faces.min() >= 0 and faces.max() < len(vertices)
     return True
-
-
-def damaged(data: bytes, random: np.random.Generator) -> bytes:
-    """The file cut off, or with bits flipped, bytes replaced, pieces repeated, moved or lost."""
-    bytes_ = bytearray(data)
-    for _ in range(random.integers(1, 4)):
-        at, to = np.sort(random.integers(0, len(bytes_) + 1, 2)).tolist()
-        match random.integers(6):
-            case 0:
-                bytes_ = bytes_[: max(1, at)]
-            case 1:
-                bytes_[at % len(bytes_)] ^= 1 << int(random.integers(8))
-            case 2:
-                bytes_[at % len(bytes_)] = int(random.choice([0, 1, 0x7F, 0x80, 0xFF, *b'09-eE.,"[]{}<>/']))
-            case 3:
-                bytes_[at:to] = bytes_[at : min(to, at + 40)] * 2
-            case 4:
-                del bytes_[at : min(to, at + 20)]
-            case 5:
-                digits = [place for place, byte in enumerate(bytes_) if byte in b"0123456789"]
-                if digits:
-                    bytes_[random.choice(digits)] = int(random.choice(list(b"0123456789-eE.")))
-        bytes_ = bytes_ or bytearray(b"?")
-    return bytes(bytes_)
 
 
 @pytest.mark.parametrize("name", FILES)
