@@ -83,6 +83,15 @@ def test_quads_are_cut_where_both_triangles_are_inside():
         assert_covers(rolled, triangles_of(np.pad(rolled, ((0, 0), (0, 1)))))
 
 
+def test_quads_that_are_triangles_stay_so():
+    corner = np.array([[0, 0, 0], [2, 1, 0], [0, 2, 0]], float)
+    for twice in range(3):
+        triangles = triangles_of(np.insert(corner, twice, corner[twice], axis=0))
+        assert triangles.tolist() == [[0, 1, 2], [0, 2, 3]] or twice == 0
+        areas = np.abs([area(np.insert(corner, twice, corner[twice], axis=0)[t][:, :2]) for t in triangles])
+        assert sorted(areas) == [0, 2]
+
+
 def test_many_polygons_of_several_sizes_stay_in_order():
     random = np.random.default_rng(10)
     sizes = random.integers(3, 9, 1000)

@@ -122,10 +122,19 @@ def _vertex_ends(text: Text, words: Ints) -> Ints:
     """Where the vertex's number ends in corners such as 1, 1/2, 1//3 and 1/2/3."""
     ends = text.ends[words]
     slashes = text.places(b"/")
-    if not slashes.size:
+    if not slashes.size or not words.size:
         return ends
-    first = np.searchsorted(slashes, text.starts[words])
-    behind = np.searchsorted(slashes, ends) - first
+    starts = text.starts[words]
+    each = len(slashes) // len(words)
+    first, behind = np.arange(len(words)) * each, np.full(len(words), each)
+    # As a rule, corners have all slashes, and all as many; else they are looked for.
+    if (
+        each * len(words) != len(slashes)
+        or (slashes[first] < starts).any()
+        or (slashes[first + each - 1] >= ends).any()
+    ):
+        first = np.searchsorted(slashes, starts)
+        behind = np.searchsorted(slashes, ends) - first
     has_slash = behind > 0
     rest = slashes[first[has_slash]]
     wrong = behind > 2

@@ -1,7 +1,7 @@
 """Polygons to triangles: n - 2 of each, in the polygons' order.
 
 A polygon that is star-shaped from its first corner, as every convex one, becomes a fan from there. If it is
-so from its second corner, the fan begins there: no simple quad is left. The rest lose one ear at a time. What
+so from its second corner, the fan begins there; no quad needs more. The rest lose one ear at a time. What
 isn't planar is seen along its normal (Newell's). No corner is moved, merged or left out, so neighbours that
 share an edge still do.
 """
@@ -61,9 +61,11 @@ def _mend(vertices: NDArray[Any], polygons: Ints, found: Ints) -> None:
     # Polygons without area, or not finite, have no right triangles: a fan keeps their corners.
     rest = rest[np.isfinite(areas[rest]).all(axis=1) & areas[rest].any(axis=1)]
     if rest.size:
-        is_fan = (_fan_areas(np.roll(flat[:, rest], -1, axis=2)) > 0).all(axis=1)
+        # A quad has no third way: it takes the better one.
+        least = areas[rest].min(axis=1) if size == 4 else 0
+        is_fan = _fan_areas(np.roll(flat[:, rest], -1, axis=2)).min(axis=1) > least
         found[rest[is_fan]] = polygons[rest[is_fan]][:, _fan(size, 1)]
-        for row in rest[~is_fan].tolist():
+        for row in rest[~is_fan].tolist() if size > 4 else ():
             found[row] = polygons[row][ears(*flat[:, row].tolist())]
 
 
