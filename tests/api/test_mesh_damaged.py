@@ -39,7 +39,7 @@ def check(kind: str, count: int, seed: int) -> None:
 
 @pytest.mark.parametrize("kind", WHOLE)
 def test_damaged_files_are_read_or_refused(kind):
-    check(kind, 150, seed=31)
+    check(kind, 100, seed=31)
 
 
 @pytest.mark.slow
@@ -52,7 +52,7 @@ def test_many_damaged_files_are_read_or_refused(kind, seed):
 @pytest.mark.parametrize("kind", WHOLE)
 def test_every_truncation_is_read_or_refused(kind):
     for whole in WHOLE[kind]:
-        for size in range(len(whole)):
+        for size in range(0, len(whole), 1 if len(whole) < 400 else 3):
             load_or_refusal(whole[:size], kind)
 
 
