@@ -112,14 +112,14 @@ REFUSED = {
     V + "\nf -4 1 2\n": "line 5: expected an index from -3, the first vertex before this line, to -1, got -4",
     "f -1 -2 -3\n" + V: "line 1: expected an index from",
     V + "f 1 2 99999999999999999999\n": "line 4: expected an index from 1 to 3",
-    V + "f 1 2\n": "line 4: expected a face of at least three corners, got 2",
-    V + "f\n": "line 4: expected a face of at least three corners, got 0",
+    V + "f 1 2\n": "line 4: expected a face of at least three corners, got 'f 1 2'",
+    V + "f\n": "line 4: expected a face of at least three corners, got 'f'",
     V + "f 1 2 3.0\n": "line 4: expected an integer, got '3.0'",
     V + "f 1 2 3e0\n": "line 4: expected an integer, got '3e0'",
     V + "f 1 2 x\n": "line 4: expected an integer, got 'x'",
     V + "f 1 2 1_0\n": "line 4: expected an integer, got '1_0'",
     V + "f 1 2 0x3\n": "line 4: expected an integer, got '0x3'",
-    V + "f 1,2,3\n": "line 4: expected a face of at least three corners, got 1",
+    V + "f 1,2,3\n": "line 4: expected a face of at least three corners, got 'f 1,2,3'",
     V + "f /1 2 3\n": "line 4: expected an integer, got '/1'",
     V + "f 1/1/1/1 2 3\n": "line 4: expected a corner such as 1, 1/2, 1//3 or 1/2/3, got '1/1/1/1'",
     V + "f 1/a 2 3\n": "line 4: expected a corner such as",
@@ -132,7 +132,9 @@ REFUSED = {
     "v 0 0 1.#INF\n" + V + "f 1 2 3\n": "line 1: expected a number, got '1.#INF'",
     "v 0 0 -1.#IND\n" + V + "f 1 2 3\n": "line 1: expected a number, got '-1.#IND'",
     "v 0 0 0 red 1 1\n" + V + "f 1 2 3\n": "line 1: expected a number, got 'red'",
-    "v 1 2\n" + V + "f 1 2 3\n": "line 1: expected 3 numbers, 4 with a weight or 6 to 8 with a colour, got 2",
+    "v 1 2\n"
+    + V
+    + "f 1 2 3\n": "line 1: expected 3 numbers, 4 with a weight or 6 to 8 with a colour, got 'v 1 2'",
     "v 1 2 3 4 5\n" + V + "f 1 2 3\n": "line 1: expected 3 numbers",
     "v 0 \\\n0 0\nv 1 2\n" + V + "f 1 2 3\n": "line 3: expected 3 numbers",
     V

@@ -81,12 +81,8 @@ def _check_others(text: Text, heads: Ints) -> None:
 
 def _vertices(text: Text, is_vertex: Bools, dtype: np.dtype[Any]) -> NDArray[Any]:
     heads, counts = text.heads[is_vertex], text.counts[is_vertex] - 1
-    wrong = np.flatnonzero(~np.isin(counts, NUMBERS))
-    if wrong.size:
-        row = wrong[0]
-        raise text.error(
-            int(heads[row]), f"expected 3 numbers, 4 with a weight or 6 to 8 with a colour, got {counts[row]}"
-        )
+    expected = "expected 3 numbers, 4 with a weight or 6 to 8 with a colour"
+    text.check(np.isin(counts, NUMBERS), heads, expected)
     for more in np.unique(counts[counts > 3]):
         text.reals(heads[counts == more, None] + np.arange(4, more + 1), np.dtype(np.float64))
     return text.reals(heads[:, None] + np.arange(1, 4), dtype)
@@ -95,12 +91,8 @@ def _vertices(text: Text, is_vertex: Bools, dtype: np.dtype[Any]) -> NDArray[Any
 def _corners(text: Text, vertex_heads: Ints, is_face: Bools) -> tuple[Ints, Ints]:
     """The vertex of each corner of all faces, from 0, and how many corners each face has."""
     heads, sizes = text.heads[is_face], text.counts[is_face] - 1
-    small = np.flatnonzero(sizes < 3)
-    if small.size:
-        row = small[0]
-        raise text.error(int(heads[row]), f"expected a face of at least three corners, got {sizes[row]}")
-    after = np.cumsum(sizes)
-    words = np.repeat(heads + 1 - (after - sizes), sizes) + np.arange(sizes.sum())
+    text.check(sizes >= 3, heads, "expected a face of at least three corners")
+    words = text.ranges(heads + 1, sizes)
     index = text.integers(words, _vertex_ends(text, words))
     # Relative indices count back from the last vertex before their line.
     before = np.repeat(np.searchsorted(vertex_heads, heads), sizes)
