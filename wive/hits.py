@@ -120,7 +120,7 @@ class Hits(ReadOnly):
         """
         if self._rays is None:
             raise ValueError("error_bound needs hits that a scene returned: these were made without rays")
-        origins, directions, *_ = self._rays.numpy(real_of(self.vertices))
+        origins, directions, *_ = self._rays.numpy(real_of(self.vertices.dtype, self._accuracy))
         return t_error_bounds(self.vertices, self.faces, self.prim, self.t, origins, directions)
 
     def spawn(self, directions: ArrayLike) -> Floats:
@@ -142,7 +142,7 @@ class Hits(ReadOnly):
         if not self._accuracy:
             raise ValueError("spawn needs hits that a scene returned: these were made without an accuracy")
         given = host_array("directions", directions)
-        rows = arguments.directions(given, len(self), real_of(self.vertices))
+        rows = arguments.directions(given, len(self), real_of(self.vertices.dtype, self._accuracy))
         return spawn_origins(self.vertices, self.faces, self.prim, self.uv, rows, self._accuracy)
 
     def __len__(self) -> int:

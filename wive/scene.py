@@ -14,7 +14,7 @@ from wive._internal.arguments import USUAL_WORK, USUAL_WORK_WITH_STATS, LanesOpt
 from wive._internal.arrays import host_array
 from wive._internal.cpu_tracer import CpuTracer
 from wive._internal.files import PathLike
-from wive._internal.precision import FLOAT32, Floats, Precision, real_of
+from wive._internal.precision import FLOAT64, Floats, Precision, real_of
 from wive._internal.rays import Rays, check_rays
 from wive._internal.storage import Options, read_scene, write_scene
 from wive._internal.tracer import Tracer
@@ -81,7 +81,7 @@ class Scene:
         found, place = resolve_backend(backend, device)
         mesh = arguments.mesh(host_array("vertices", vertices), host_array("faces", faces), accuracy)
         points, self._faces = map(arguments.read_only, mesh)
-        self._real = real_of(points)
+        self._real = real_of(points.dtype, accuracy)
         bvh = _cpu.Bvh(points, self._faces, accuracy, nodes=nodes, quality=quality)
         self._tracer = _tracer(bvh, self._faces, found, place)
 
@@ -319,7 +319,7 @@ class Scene:
     def __repr__(self) -> str:
         """Size and options."""
         shown = f"{len(self)} triangles, backend={self.backend!r}, accuracy={self.accuracy!r}"
-        return f"Scene({shown})" if self._real is FLOAT32 else f"Scene({shown}, precision='float64')"
+        return f"Scene({shown}, precision='float64')" if self._real is FLOAT64 else f"Scene({shown})"
 
     def __reduce__(self) -> tuple[Callable[..., Scene], tuple[Any, ...]]:
         """Pickle the mesh and the options; unpickling builds the tree again."""

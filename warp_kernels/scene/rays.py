@@ -8,7 +8,7 @@ import warp as wp
 
 from wive._internal import arguments
 from wive._internal.arrays import NUMPY, Library, library_of, lies_on
-from wive._internal.precision import Floats, real_named
+from wive._internal.precision import FLOAT32, Floats, Real
 from wive._internal.rays import Rays
 from wive.warp_kernels.lanes.precision import PRECISIONS, precision_of
 
@@ -36,12 +36,12 @@ class WarpRays:
 class RayLoader:
     """Turns what users pass into `WarpRays` of one precision on one device."""
 
-    def __init__(self, device: str, precision: str = "float32") -> None:
+    def __init__(self, device: str, real: Real = FLOAT32) -> None:
         """Make the common limits."""
         self.device = device
-        self.precision = precision
-        self._dtype = real_named(precision)
-        numbers = PRECISIONS[precision]
+        self.precision = real.name
+        self._dtype = real
+        numbers = PRECISIONS[real.name]
         self._real, self._vec3, self._bytes = numbers.real, numbers.vec3, 4 * numbers.words
         self._common = {value: wp.full(1, value, dtype=self._real, device=device) for value in COMMON_LIMITS}
 

@@ -14,7 +14,7 @@ from wive import _cpu
 from wive._internal.arguments import Lanes, Work
 from wive._internal.arrays import NUMPY
 from wive._internal.picture import Image, Settings
-from wive._internal.precision import Floats
+from wive._internal.precision import Floats, real_of
 from wive._internal.rays import Rays
 from wive._internal.wrapping import Wrapping
 from wive.all_hits import AllHits, WrappedAllHits
@@ -57,7 +57,7 @@ class WarpTracer:
         self.vertices, self.faces = bvh.vertices, faces
         self.accuracy, self.precision = bvh.accuracy, bvh.precision
         self.tree = upload(bvh, device)
-        self.loader = RayLoader(device, bvh.precision)
+        self.loader = RayLoader(device, real_of(bvh.vertices.dtype, bvh.accuracy))
         self._numbers = PRECISIONS[bvh.precision]
         wp.synchronize_stream(device)
 

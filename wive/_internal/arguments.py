@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import functools
 import operator
+import sys
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Literal, NamedTuple, TypedDict, TypeGuard
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from wive._internal.precision import FLOAT32, FLOAT64, Floats, Real, float32_or_refused, real_of
+from wive._internal.precision import FLOAT32, Floats, Real, real_of
 
 Given = ArrayLike  # what users pass, by a name short enough for overloads
 Int32 = NDArray[np.int32]
@@ -99,10 +100,7 @@ def vector(name: str, value: ArrayLike) -> NDArray[np.float64]:
 
 
 def mesh(vertices: ArrayLike, faces: ArrayLike, accuracy: str = "watertight") -> tuple[Floats, Int32]:
-    """Vertices (v,3) float32 or float64 and faces (f,3) int32, C-contiguous; such arrays are not copied.
-
-    Accuracy "exact" takes float32 numbers only.
-    """
+    """Vertices (v,3) float32 or float64 and faces (f,3) int32, C-contiguous; such arrays are not copied."""
     points = _positions(vertices)
     corners = _numeric("faces", faces, "an (f, 3) array of integers", "iu", "round them to integer indices")
     if corners.shape == (0,):
@@ -118,10 +116,10 @@ def mesh(vertices: ArrayLike, faces: ArrayLike, accuracy: str = "watertight") ->
         raise ValueError(
             f"faces must index the {len(points)} vertices from 0, got {corners[face].tolist()} in face {face}"
         )
-    real = real_of(vertices)
-    if accuracy == "exact" and real is FLOAT64:
-        points, real = float32_or_refused(points), FLOAT32
-    return real.array(points), np.require(corners, np.int32, ["C", "A"])
+    # Lists have no dtype: NumPy's choice would depend on whether a number in them has a decimal point.
+    given = np.dtype(np.float32) if isinstance(vertices, list | tuple) else points.dtype
+    points = real_of(given, accuracy).taken("vertices", vertices, points)
+    return points, np.require(corners, np.int32, ["C", "A"])
 
 
 def moved_vertices(vertices: ArrayLike, count: int, real: Real) -> Floats:
@@ -132,7 +130,7 @@ def moved_vertices(vertices: ArrayLike, count: int, real: Real) -> Floats:
             f"vertices must have shape ({count}, 3), as the scene's own, got {points.shape}: "
             "make a new Scene for another mesh"
         )
-    return real.array(points)
+    return real.taken("vertices", vertices, points)
 
 
 def read_only(array: NDArray[Any]) -> NDArray[Any]:
@@ -228,22 +226,22 @@ def lanes(value: object) -> Lanes | None:
 
 def vectors(name: str, value: ArrayLike, real: Real) -> Floats:
     """Vectors (n,3), or one (3,) that all rays share, of `real`'s dtype, C-contiguous."""
-    array = _numeric(name, value, "an (n, 3) array of real numbers", "fiu")
+    array = _numeric(name, value, "an (n, 3) array of real numbers", "fiu", masked=True)
     if array.shape == (0,):
-        array = array.reshape(0, 3)
+        return real.array(array.reshape(0, 3))
     if array.ndim not in (1, 2) or array.shape[-1] != 3:
         raise ValueError(f"{name} must have shape (n, 3), or (3,) if all rays share it, got {array.shape}")
-    return real.array(array)
+    return _missing_if_masked(name, value, array, real)
 
 
 def limits(name: str, value: ArrayLike, count: int, real: Real = FLOAT32) -> Floats:
     """The limits of `count` rays, (1,) or (count,) of `real`'s dtype."""
-    array = _numeric(name, value, "a real number or one per ray", "fiu")
+    array = _numeric(name, value, "a real number or one per ray", "fiu", masked=True)
     if array.shape not in ((), (count,)):
         raise ValueError(
             f"{name} must be one number or have shape ({count},), one per ray, got shape {array.shape}"
         )
-    return real.array(array.reshape(-1))
+    return _missing_if_masked(name, value, array, real).reshape(-1)
 
 
 def _is_ready(value: ArrayLike, dtype: np.dtype[Any]) -> TypeGuard[Floats]:
@@ -268,15 +266,47 @@ def _positions(vertices: ArrayLike) -> NDArray[Any]:
 
 
 def _numeric(
-    name: str, value: ArrayLike, expected: str, kinds: Sequence[str], mend: str = "convert it first"
+    name: str,
+    value: ArrayLike,
+    expected: str,
+    kinds: Sequence[str],
+    mend: str = "convert it first",
+    masked: bool = False,
 ) -> NDArray[Any]:
+    """`value` as an array of these kinds of dtype; ValueError for masked numbers unless they may be `masked`."""
     try:
         array = np.asarray(value)
     except (TypeError, ValueError):
         raise ValueError(f"{name} must be {expected}, got rows of unequal length") from None
     if array.dtype.kind not in kinds and array.shape != (0,):
         raise TypeError(f"{name} must be {expected}, got dtype {array.dtype}: {mend}")
+    if not masked and (mask := _mask(value)) is not None:
+        raise ValueError(
+            f"{name} must be {expected}, got {np.count_nonzero(mask)} that are masked: fill or remove them first"
+        )
     return array
+
+
+def _missing_if_masked(name: str, value: ArrayLike, array: NDArray[Any], real: Real) -> Floats:
+    """The array's numbers in `real`'s dtype, NaN if masked: such a ray misses."""
+    mask = _mask(value)
+    if mask is None:
+        return real.taken(name, value, array)
+    shown = np.where(mask, array.dtype.type(0), array)
+    numbers = real.taken(name, shown, shown).copy()
+    numbers[mask] = np.nan
+    return numbers
+
+
+def _mask(value: ArrayLike) -> NDArray[np.bool_] | None:
+    """Which numbers of a masked array, or of a list of such, are masked; None if there is none."""
+    ma = sys.modules.get("numpy.ma")  # importing it takes time, and without it there are no masked arrays
+    if ma is None or type(value) is np.ndarray:
+        return None
+    if isinstance(value, list | tuple) and any(isinstance(row, ma.MaskedArray) for row in value):
+        value = ma.asarray(value)
+    mask = ma.getmask(value)
+    return ma.getmaskarray(value) if np.any(mask) else None
 
 
 def _described(value: object) -> str:

@@ -1,4 +1,4 @@
-"""The numbers of a scene: float64 if the vertices were given as an array of float64, else float32."""
+"""The numbers of a scene: float64 if the vertices are an array of float64, else float32."""
 
 from typing import Any, Literal
 
@@ -10,26 +10,40 @@ Floats = NDArray[np.float32 | np.float64]
 
 
 class Real:
-    """A precision, float32 or float64: the dtype of vertices, rays, t and uv."""
+    """The dtype of vertices, rays, t and uv, and whether other numbers may be rounded to it.
 
-    __slots__ = ("dtype", "limits", "name")
+    Accuracy "exact" rounds none: its answers are those for the numbers that were given.
+    """
 
-    def __init__(self, name: Precision) -> None:
+    __slots__ = ("dtype", "limits", "name", "rounds")
+
+    def __init__(self, name: Precision, rounds: bool = True) -> None:
         """Make the limits of most queries once: making them takes a third of the time of a one-ray query."""
         self.name: Precision = name
+        self.rounds = rounds
         self.dtype: np.dtype[Any] = np.dtype(name)
         self.limits = {value: _one(value, self.dtype) for value in (0.0, float("inf"))}
 
     def array(self, values: NDArray[Any]) -> Floats:
-        """The values in this dtype, C-contiguous; not copied if they are so already."""
+        """The values in this dtype, rounded, C-contiguous; not copied if they are so already."""
         if values.dtype is self.dtype and values.flags.c_contiguous and values.flags.aligned:
             return values
         with np.errstate(over="ignore"):
             return np.require(values, self.dtype, ["C", "A"])
 
-    def __reduce__(self) -> tuple[Any, tuple[str]]:
-        """Copies and pickles are `FLOAT32` and `FLOAT64` themselves."""
-        return real_named, (self.name,)
+    def taken(self, name: str, given: ArrayLike, values: NDArray[Any]) -> Floats:
+        """What `array` returns for `values`, the array made of the argument `name`, whose value is `given`.
+
+        Raises ValueError if that rounds a number and this precision may not.
+        """
+        rounded = self.array(values)
+        if not self.rounds and values.dtype != self.dtype:
+            refuse_rounded(name, given, values, rounded)
+        return rounded
+
+    def __reduce__(self) -> tuple[Any, tuple[str, bool]]:
+        """Copies and pickles are the constants below themselves."""
+        return _constant, (self.name, self.rounds)
 
 
 def _one(value: float, dtype: np.dtype[Any]) -> Floats:
@@ -38,14 +52,18 @@ def _one(value: float, dtype: np.dtype[Any]) -> Floats:
     return array
 
 
-FLOAT32, FLOAT64 = Real("float32"), Real("float64")
+FLOAT32, FLOAT64, EXACT = Real("float32"), Real("float64"), Real("float32", rounds=False)
 
 
-def real_of(values: ArrayLike) -> Real:
-    """FLOAT64 for an array of float64; FLOAT32 for all else: other dtypes, lists, numbers."""
-    dtype = getattr(values, "dtype", None)
-    is_float64 = isinstance(dtype, np.dtype) and dtype.kind == "f" and dtype.itemsize == 8
-    return FLOAT64 if is_float64 else FLOAT32
+def _constant(name: str, rounds: bool) -> Real:
+    return EXACT if not rounds else real_named(name)
+
+
+def real_of(dtype: np.dtype[Any], accuracy: str) -> Real:
+    """The numbers of a scene whose vertices have this dtype."""
+    if accuracy == "exact":
+        return EXACT
+    return FLOAT64 if dtype.kind == "f" and dtype.itemsize == 8 else FLOAT32
 
 
 def real_named(name: DTypeLike) -> Real:
@@ -59,19 +77,24 @@ def real_named(name: DTypeLike) -> Real:
     raise ValueError(f"dtype must be float32 or float64, got {name!r:.60}")
 
 
-def float32_or_refused(vertices: NDArray[Any]) -> NDArray[Any]:
-    """float64 vertices as float32 for accuracy "exact"; ValueError if that would round one of them.
+def refuse_rounded(name: str, given: ArrayLike, values: NDArray[Any], rounded: Floats) -> None:
+    """Raise ValueError if a number that the user gave differs from the one it was rounded to.
 
-    NaN is not refused here: construction names its index.
+    NaN is kept: whether it is a vertex or a ray decides what it means.
     """
-    with np.errstate(over="ignore"):
-        rounded = vertices.astype(np.float32)
-    lossy = (rounded != vertices) & ~np.isnan(vertices)
-    if lossy.any():
-        row = int(np.argmax(lossy.any(axis=-1)))
+    # NumPy makes one dtype of the numbers of lists and tables, which may round integers: see them as they were.
+    exact = values if isinstance(given, np.ndarray) else np.asarray(given, object).reshape(values.shape)
+    with np.errstate(over="ignore", invalid="ignore"):
+        # Compared in the dtype of the values: comparing int64 to float32 would round once more.
+        kept = (rounded.astype(exact.dtype) == exact) | np.isnan(rounded)
+    if exact.dtype.kind in "iu":
+        kept &= rounded <= np.nextafter(np.float32(np.iinfo(exact.dtype).max), np.float32(0))
+    kept = np.atleast_1d(kept)
+    if not kept.all():
+        row = int(np.argmin(kept.reshape(len(kept), -1).all(axis=1)))
+        place, number = (name, given) if values.ndim == 0 else (f"{name}[{row}]", exact[row].tolist())
+        rounding = f"{name}.astype(np.float32)" if values is exact else f"np.asarray({name}, np.float32)"
         raise ValueError(
-            "vertices must be float32 numbers for accuracy 'exact', "
-            f"got vertices[{row}] = {vertices[row].tolist()}: "
-            "round them with vertices.astype(np.float32), or use accuracy 'watertight'"
+            f"{name} must be float32 numbers for accuracy 'exact', got {place} = {number!s:.90}: "
+            f"round them with {rounding}, or use accuracy 'watertight'"
         )
-    return rounded
