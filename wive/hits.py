@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from wive import _cpu
 from wive._internal import arguments
 from wive._internal.arrays import Library, host_array
+from wive._internal.distant import Moved
 from wive._internal.error_bounds import t_error_bounds
 from wive._internal.precision import Floats, real_of
 from wive._internal.rays import Rays
@@ -68,6 +69,7 @@ class Hits(ReadOnly):
     faces: NDArray[np.int32]
     _rays: Rays | None
     _accuracy: str
+    _moved: Moved | None
 
     def __init__(
         self,
@@ -78,11 +80,11 @@ class Hits(ReadOnly):
         faces: NDArray[np.int32],
         rays: Rays | None = None,
         accuracy: str = "",
+        moved: Moved | None = None,
     ) -> None:
         """Keep the arrays; a scene adds its rays and accuracy, for `error_bound` and `spawn`."""
-        vars(self).update(
-            t=t, prim=prim, uv=uv, vertices=vertices, faces=faces, _rays=rays, _accuracy=accuracy
-        )
+        vars(self).update(t=t, prim=prim, uv=uv, vertices=vertices, faces=faces)
+        vars(self).update(_rays=rays, _accuracy=accuracy, _moved=moved)
 
     @property
     def mask(self) -> NDArray[np.bool_]:
@@ -109,7 +111,7 @@ class Hits(ReadOnly):
         """(n,) float64 upper bound on |t - t*|, in the unit of t; NaN on a miss.
 
         t* is the exact distance at which the ray, with vertices and rays in the scene's precision, meets the
-        plane of the triangle hit. The bound is proved for every accuracy, docs/accuracy.md, "The error of t".
+        plane of the triangle hit; rays that `intersect` moves are as they were given. The bound is proved for every accuracy, docs/accuracy.md, "The error of t".
         It is inf if double arithmetic can't tell the ray from one in the plane. It comes in float64, because
         what remains after t was rounded to float32 is far below what a float32 of that size resolves. For
         float64 scenes most of the bound is the error that its own computation in double may have made: some
@@ -121,7 +123,12 @@ class Hits(ReadOnly):
         if self._rays is None:
             raise ValueError("error_bound needs hits that a scene returned: these were made without rays")
         origins, directions, *_ = self._rays.numpy(real_of(self.vertices.dtype, self._accuracy))
-        return t_error_bounds(self.vertices, self.faces, self.prim, self.t, origins, directions)
+        bounds = t_error_bounds(self.vertices, self.faces, self.prim, self.t, origins, directions)
+        if self._moved is None:
+            return bounds
+        mesh, t = (self.vertices.astype(np.float64), self.faces), self.t.astype(np.float64)
+        as_given = t_error_bounds(*mesh, self.prim, t, *self._moved.given)
+        return np.where(self._moved.steps != 0, as_given, bounds)
 
     def spawn(self, directions: ArrayLike) -> Floats:
         """(n,3) origins for rays that leave the surface from the points hit; NaN on a miss.

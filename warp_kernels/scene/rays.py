@@ -8,6 +8,7 @@ import warp as wp
 
 from wive._internal import arguments
 from wive._internal.arrays import NUMPY, Library, library_of, lies_on
+from wive._internal.distant import Traced
 from wive._internal.precision import FLOAT32, Floats, Real
 from wive._internal.rays import Rays
 from wive.warp_kernels.lanes.precision import PRECISIONS, precision_of
@@ -40,14 +41,17 @@ class RayLoader:
         """Make the common limits."""
         self.device = device
         self.precision = real.name
-        self._dtype = real
-        numbers = PRECISIONS[real.name]
-        self._real, self._vec3, self._bytes = numbers.real, numbers.vec3, 4 * numbers.words
+        self.numbers = real
+        warp = PRECISIONS[real.name]
+        self._real, self._vec3, self._bytes = warp.real, warp.vec3, 4 * warp.words
         self._common = {value: wp.full(1, value, dtype=self._real, device=device) for value in COMMON_LIMITS}
 
-    def from_numpy(self, rays: Rays) -> WarpRays:
-        """Rays checked as for every backend; copied only if the device is not the host."""
-        origins, directions, tmin, tmax = rays.numpy(self._dtype)
+    def from_numpy(self, rays: Rays, arrays: Traced | None = None) -> WarpRays:
+        """Rays checked as for every backend; copied only if the device is not the host.
+
+        `arrays` are what `rays.numpy` returned, if it was asked before.
+        """
+        origins, directions, tmin, tmax = arrays or rays.numpy(self.numbers)
         return WarpRays(
             wp.array(origins, dtype=self._vec3, device=self.device, copy=False),
             wp.array(directions, dtype=self._vec3, device=self.device, copy=False),
@@ -76,7 +80,7 @@ class RayLoader:
         """(count,) vec3 of directions (count,3), or (3,) for all; NumPy's are copied to the device."""
         library = library_of(value)
         if library is NUMPY:
-            rows = arguments.directions(value, count, self._dtype)
+            rows = arguments.directions(value, count, self.numbers)
             if rows.strides[0] == 0:
                 one = wp.array(rows[:1], dtype=self._vec3, device=self.device)
                 return _view(one, count, 0)
@@ -99,7 +103,7 @@ class RayLoader:
     def _vectors(self, name: str, value: Any, library: Library) -> tuple[Any, bool]:
         """(n,) vec3 and False, or the (1,) that all rays share and True."""
         if library is NUMPY:
-            shared = arguments.vectors(name, value, self._dtype).tolist()
+            shared = arguments.vectors(name, value, self.numbers).tolist()
             return wp.full(1, self._vec3(*shared), dtype=self._vec3, device=self.device), True
         array = self._checked(name, value, library)
         if array.dtype is self._vec3 and array.ndim == 1:
@@ -118,7 +122,7 @@ class RayLoader:
         if type(value) is float and value in self._common:
             return self._common[value]
         if library is NUMPY:
-            (number,) = arguments.limits(name, value, 1, self._dtype)
+            (number,) = arguments.limits(name, value, 1, self.numbers)
             return self._limit_of_numpy(np.array([number], self.precision))
         array = self._checked(name, value, library)
         if array.shape not in ((1,), (count,)) or array.dtype is not self._real:

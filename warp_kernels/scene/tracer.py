@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from wive import _cpu
 from wive._internal.arguments import Lanes, Work
 from wive._internal.arrays import NUMPY
+from wive._internal.distant import Ball, Moved, moved
 from wive._internal.picture import Image, Settings
 from wive._internal.precision import Floats, real_of
 from wive._internal.rays import Rays
@@ -85,22 +86,23 @@ class WarpTracer:
     def intersect(self, rays: Rays, work: Work) -> tuple[Hits, Stats | None]:
         """Closest hits."""
         with rays.library.on_stream(self.device):
-            loaded = self._load(rays)
+            loaded, near = self._load(rays)
             t, prim, uv = self._outputs(len(loaded))
             steps = self._steps(len(loaded), work)
             lanes = self._lanes(work, loaded)
             launch_closest(self.tree, *_arrays(loaded), t, prim, uv, stats=steps, lanes=lanes)
             if rays.library is NUMPY:
                 check(self.tree)
-                arrays = t.numpy(), prim.numpy(), uv.numpy()
-                return Hits(*arrays, self.vertices, self.faces, rays, self.accuracy), _numpy_stats(steps)
+                found = t.numpy() if near is None else near.t(t.numpy())
+                arrays = found, prim.numpy(), uv.numpy(), self.vertices, self.faces
+                return Hits(*arrays, rays, self.accuracy, near), _numpy_stats(steps)
             hits = WarpHits(self, t, prim, uv, loaded)
             return WrappedHits(hits, self._wrapping(rays)), _stats(steps, rays)
 
     def occluded(self, rays: Rays, work: Work) -> tuple[Any, Stats | None]:
         """(n,) bool, whether anything is hit."""
         with rays.library.on_stream(self.device):
-            loaded = self._load(rays)
+            loaded, _ = self._load(rays)
             mask = wp.empty(len(loaded), dtype=wp.bool, device=self.device)
             steps = self._steps(len(loaded), work)
             launch_any(self.tree, *_arrays(loaded), mask, stats=steps, lanes=self._lanes(work, loaded))
@@ -109,13 +111,13 @@ class WarpTracer:
     def count(self, rays: Rays, work: Work) -> tuple[Any, Stats | None]:
         """(n,) int32, the number of hits."""
         with rays.library.on_stream(self.device):
-            counts, steps = self._count(self._load(rays), work)
+            counts, steps = self._count(self._load(rays)[0], work)
             return self._returned(counts, steps, rays)
 
     def intersect_all(self, rays: Rays, work: Work) -> tuple[AllHits, Stats | None]:
         """All hits: one pass counts them, which makes room for the pass that lists them."""
         with rays.library.on_stream(self.device):
-            loaded = self._load(rays)
+            loaded, near = self._load(rays)
             counts, steps = self._count(loaded, work)
             offsets = scan_counts(counts)
             total = int(offsets[-1:].numpy()[0])
@@ -130,7 +132,11 @@ class WarpTracer:
             if rays.library is NUMPY:
                 check(self.tree)
                 arrays = offsets.numpy(), t.numpy(), prim.numpy(), uv.numpy()
-                return AllHits(*arrays, self.vertices, self.faces), _numpy_stats(steps)
+                every = AllHits(*arrays, self.vertices, self.faces)
+                if near is not None:
+                    farther = near.t(every.t, every.ray)
+                    every = AllHits(arrays[0], farther, *arrays[2:], self.vertices, self.faces)
+                return every, _numpy_stats(steps)
             hits = WarpAllHits(self, offsets, t, prim, uv)
             return WrappedAllHits(hits, self._wrapping(rays)), _stats(steps, rays)
 
@@ -157,8 +163,17 @@ class WarpTracer:
             return output.numpy(), _numpy_stats(steps)
         return rays.library.from_warp(output), _stats(steps, rays)
 
-    def _load(self, rays: Rays) -> WarpRays:
-        return self.loader.from_numpy(rays) if rays.library is NUMPY else self.loader.from_device(rays)
+    def _load(self, rays: Rays) -> tuple[WarpRays, Moved | None]:
+        """The rays on the device, and how far some were moved: NumPy's only, others are not converted."""
+        if rays.library is not NUMPY:
+            return self.loader.from_device(rays), None
+        arrays = rays.numpy(self.loader.numbers)
+        near = moved(rays, arrays, self.loader.numbers, self._ball)
+        return self.loader.from_numpy(rays, arrays if near is None else near.arrays), near
+
+    @functools.cached_property
+    def _ball(self) -> Ball:
+        return Ball.around(self.bvh.bounds)
 
     def _lanes(self, work: Work, rays: WarpRays) -> Lanes:
         return choose_lanes(work.lanes, len(rays), self.device != "cpu")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 from typing import Any, NoReturn
 
@@ -12,6 +13,7 @@ from wive import _cpu
 from wive._internal import arguments
 from wive._internal.arguments import Work
 from wive._internal.arrays import NUMPY
+from wive._internal.distant import Ball, Moved, Traced, moved
 from wive._internal.picture import Image, Settings
 from wive._internal.precision import Floats, real_of
 from wive._internal.rays import Rays
@@ -42,36 +44,40 @@ class CpuTracer:
 
     def intersect(self, rays: Rays, work: Work) -> tuple[Hits, Stats | None]:
         """Closest hits."""
+        arrays, near = self._traced(rays)
         t, prim, uv, steps = self.bvh.intersect(
-            self._kernels, *rays.numpy(self._real), work.threads, work.in_flight, work.stats
+            self._kernels, *arrays, work.threads, work.in_flight, work.stats
         )
-        hits = Hits(t, prim, uv, self.bvh.vertices, self._faces, rays, self._accuracy)
+        if near is not None:
+            t = near.t(t)
+        hits = Hits(t, prim, uv, self.bvh.vertices, self._faces, rays, self._accuracy, near)
         if rays.library is not NUMPY:
             hits = WrappedHits(hits, _wrapping(rays))
         return hits, None if steps is None else stats_of(steps, rays.library)
 
     def occluded(self, rays: Rays, work: Work) -> tuple[Any, Stats | None]:
         """(n,) bool, whether anything is hit."""
-        mask, steps = self.bvh.occluded(
-            self._kernels, *rays.numpy(self._real), work.threads, work.in_flight, work.stats
-        )
+        arrays, _ = self._traced(rays)
+        mask, steps = self.bvh.occluded(self._kernels, *arrays, work.threads, work.in_flight, work.stats)
         library = rays.library
         return library.from_numpy(mask), None if steps is None else stats_of(steps, library)
 
     def count(self, rays: Rays, work: Work) -> tuple[Any, Stats | None]:
         """(n,) int32, the number of hits."""
-        counts, steps = self.bvh.count(
-            self._kernels, *rays.numpy(self._real), work.threads, work.in_flight, work.stats
-        )
+        arrays, _ = self._traced(rays)
+        counts, steps = self.bvh.count(self._kernels, *arrays, work.threads, work.in_flight, work.stats)
         library = rays.library
         return library.from_numpy(counts), None if steps is None else stats_of(steps, library)
 
     def intersect_all(self, rays: Rays, work: Work) -> tuple[AllHits, Stats | None]:
         """All hits."""
+        arrays, near = self._traced(rays)
         offsets, t, prim, uv, steps = self.bvh.intersect_all(
-            self._kernels, *rays.numpy(self._real), work.threads, work.in_flight, work.stats
+            self._kernels, *arrays, work.threads, work.in_flight, work.stats
         )
         hits = AllHits(offsets, t, prim, uv, self.bvh.vertices, self._faces)
+        if near is not None:
+            hits = AllHits(offsets, near.t(t, hits.ray), prim, uv, self.bvh.vertices, self._faces)
         if rays.library is not NUMPY:
             hits = WrappedAllHits(hits, _wrapping(rays))
         return hits, None if steps is None else stats_of(steps, rays.library)
@@ -97,6 +103,18 @@ class CpuTracer:
             )
 
         return render_rows
+
+    @functools.cached_property
+    def _ball(self) -> Ball:
+        return Ball.around(self.bvh.bounds)
+
+    def _traced(self, rays: Rays) -> tuple[Traced, Moved | None]:
+        """The rays as the core takes them, and how far some were moved."""
+        arrays = rays.numpy(self._real)
+        if arrays[0] is rays.origins and arrays[1] is rays.directions:
+            return arrays, None
+        near = moved(rays, arrays, self._real, self._ball)
+        return (arrays, None) if near is None else (near.arrays, near)
 
 
 def _wrapping(rays: Rays) -> Wrapping:

@@ -30,9 +30,17 @@ class Rays(NamedTuple):
         """Origins, directions, tmin and tmax as the core takes them; memory is shared if it can be."""
         if self.library is NUMPY:
             return arguments.rays(self.origins, self.directions, self.tmin, self.tmax, real)
+        return arguments.rays(*self._on_host(), real)
+
+    def are(self, dtype: np.dtype[Any]) -> bool:
+        """Whether origins and directions were given in this dtype."""
+        origins, directions, *_ = self._on_host()
+        return np.asarray(origins).dtype == np.asarray(directions).dtype == dtype
+
+    def _on_host(self) -> tuple[Any, Any, Any, Any]:
         given = zip(self.libraries, self[:4], strict=True)
         origins, directions, tmin, tmax = (library.to_numpy(value) for library, value in given)
-        return arguments.rays(origins, directions, tmin, tmax, real)
+        return origins, directions, tmin, tmax
 
 
 ALL_NUMPY = NUMPY, NUMPY, NUMPY, NUMPY
