@@ -8,40 +8,25 @@ This module does not import trimesh: it uses the mesh that it is given.
 
 from __future__ import annotations
 
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
-from wive import _cpu
-from wive._internal.precision import Floats, real_named
+from wive._internal import arguments
+from wive._internal.inside import contains, counts_by_place
+from wive._internal.placed_mesh import Float64, Found, Int64, PlacedMesh
+from wive._internal.precision import FLOAT64, Floats, real_named
 from wive.scene import Scene
-
-Float64 = NDArray[np.float64]
-Int64 = NDArray[np.int64]
-
-# Directions for `contains_points`, tried until a ray and its opposite agree; the first is trimesh's.
-DIRECTIONS = (
-    (0.4395064455, 0.617598629942, 0.652231566745),
-    (-0.7312847092, 0.2291845177, 0.6424302511),
-    (0.1739403627, -0.8852167384, 0.4314573921),
-)
-
-
-class _Placed(NamedTuple):
-    """A scene over the mesh moved to the origin and scaled, and the hash of that mesh."""
-
-    mesh_hash: int
-    scene: Scene
-    origin: Float64
-    scale: float
 
 
 class RayMeshIntersector:
     """Ray queries on a `trimesh.Trimesh`, with the methods of trimesh's own intersectors.
 
     Coordinates are converted to `dtype` relative to the mesh's centre, directions to unit vectors. The tree
-    is built when first needed, and again after the mesh's hash has changed. Can be pickled and copied.
+    is built when first needed, and again after the mesh's hash has changed; making an intersector costs
+    nothing, and the mesh may get its data later. Triangles with a corner that is NaN or infinite are never
+    hit. Can be pickled and copied.
     """
 
     def __init__(
@@ -63,22 +48,29 @@ class RayMeshIntersector:
             backend, device, accuracy: as for `wive.Scene`.
             threads: how many each query uses; None is every core. For CPU backends.
             dtype: of the scene's numbers: np.float32, or np.float64 if detail is finer than 1e-7 of the
-                mesh's size.
+                mesh's size, but not with accuracy "exact".
 
-        Raises TypeError if `geometry` is no such mesh. Queries raise what `wive.Scene` and its queries raise.
+        Raises TypeError if `geometry` is no such mesh, ValueError for a bad `dtype`. Queries raise what
+        `wive.Scene` and its queries raise.
         """
-        missing = [name for name in ("vertices", "faces", "bounds") if not hasattr(geometry, name)]
+        # A primitive makes its vertices when they are asked for: its class says that it has some.
+        has = type(geometry), getattr(geometry, "__dict__", ())
+        missing = [
+            name for name in ("vertices", "faces", "bounds") if not (hasattr(has[0], name) or name in has[1])
+        ]
         if missing:
             raise TypeError(
                 f"geometry must be a trimesh.Trimesh, got {type(geometry).__name__} without "
                 f"{', '.join(missing)}: make one with trimesh.load(path, force='mesh')"
             )
+        self._real = real_named(dtype)
+        if self._real is FLOAT64 and accuracy == "exact":
+            raise ValueError("dtype must be float32 for accuracy 'exact', got float64: leave one of them out")
         self.mesh = geometry
         self._scale_to_box = scale_to_box
         self._options: dict[str, Any] = {"backend": backend, "device": device, "accuracy": accuracy}
         self._threads = threads
-        self._real = real_named(dtype)
-        self._placed: _Placed | None = None
+        self._placed: tuple[int, PlacedMesh] | None = None
 
     @property
     def scene(self) -> Scene:
@@ -103,29 +95,22 @@ class RayMeshIntersector:
 
         Returns (m,) int64 rows of `mesh.faces`, (m,) int64 rays, and (m,3) float64 points if
         `return_locations`. As in trimesh, all first hits precede all second ones, and so on, each by
-        ascending ray.
+        ascending ray; and one place is one hit: of triangles that coincide there, the first in `mesh.faces`.
         """
         origins, directions = _rays(ray_origins, ray_directions)
+        most = None if max_hits is None else arguments.integer("max_hits", max_hits, 0)
         placed = self._place()
-        near, unit = _placed_rays(placed, origins, directions)
+        origins = placed.near(origins, directions)
         if multiple_hits:
-            found = placed.scene.intersect_all(near, unit, threads=self._threads)
-            ray = found.ray
-            depth = np.arange(len(ray)) - found.offsets[ray]
-            if len(ray) and depth.max() < 1 << 16:
-                depth = depth.astype(np.uint16)  # NumPy sorts 16-bit integers by radix
-            order = np.argsort(depth, kind="stable")
-            if max_hits is not None:
-                order = order[: np.count_nonzero(depth < max_hits)]
-            ray, prim, uv = ray[order], found.prim[order], found.uv[order]
+            found = self._hit_places(placed, origins, directions, most)
         else:
-            first = placed.scene.intersect(near, unit, threads=self._threads)
-            (ray,) = np.nonzero(first.mask) if max_hits is None or max_hits > 0 else (np.zeros(0, np.int64),)
-            prim, uv = first.prim[ray], first.uv[ray]
-        triangles, rays = prim.astype(np.int64), ray.astype(np.int64)
+            first = placed.scene.intersect(*placed.rays(origins, directions), threads=self._threads)
+            (ray,) = np.nonzero(first.mask & (most != 0))
+            found = Found(ray, first.prim[ray], first.uv[ray])
+        triangles, rays = found.prim.astype(np.int64), found.ray.astype(np.int64)
         if not return_locations:
             return triangles, rays
-        return triangles, rays, self._locations(placed, (prim, uv, rays), origins, directions)
+        return triangles, rays, placed.points(found, origins, directions)
 
     def intersects_location(
         self, ray_origins: ArrayLike, ray_directions: ArrayLike, multiple_hits: bool = True
@@ -141,74 +126,53 @@ class RayMeshIntersector:
 
     def intersects_first(self, ray_origins: ArrayLike, ray_directions: ArrayLike) -> NDArray[np.int32]:
         """(n,) int32 row of `mesh.faces` that each ray hits first, -1 if it hits nothing."""
-        placed = self._place()
-        rays = _placed_rays(placed, *_rays(ray_origins, ray_directions))
+        placed, rays = self._placed_rays(ray_origins, ray_directions)
         return placed.scene.intersect(*rays, threads=self._threads).prim
 
     def intersects_any(self, ray_origins: ArrayLike, ray_directions: ArrayLike) -> NDArray[np.bool_]:
         """(n,) bool: whether each ray hits anything."""
-        placed = self._place()
-        rays = _placed_rays(placed, *_rays(ray_origins, ray_directions))
+        placed, rays = self._placed_rays(ray_origins, ray_directions)
         return placed.scene.occluded(*rays, threads=self._threads)
 
     def contains_points(self, points: ArrayLike) -> NDArray[np.bool_]:
         """(n,) bool: whether each point (n,3) lies inside the mesh, which must be closed.
 
         A point is inside if rays in both directions along a line pass the surface an odd number of times. If
-        the two disagree, as they may at an edge, another line is tried. Points on the surface may be inside
-        or not.
+        the two disagree, another line is tried. Faces may be stored twice, turned or not, as in two-sided
+        exports. Points on the surface may be inside or not.
         """
-        places = np.asarray(points, np.float64)
-        if places.ndim != 2 or places.shape[1] != 3:
-            raise ValueError(f"points must have shape (n, 3), got {places.shape}")
-        contained = np.zeros(len(places), np.bool_)
-        if self.mesh.bounds is None:
-            return contained
-        low, high = self.mesh.bounds
-        (asked,) = np.nonzero(((places >= low) & (places <= high)).all(axis=1))
+        places = arguments.vectors("points", points, FLOAT64, may_be_one=False)
         placed = self._place()
-        for direction in DIRECTIONS:
-            there = self._passes(placed, places[asked], np.array(direction))
-            back = self._passes(placed, places[asked], -np.array(direction))
-            # A ray that meets nothing proves that the point is outside, whatever the other ray meets.
-            free = (there == 0) | (back == 0)
-            agreed = there % 2 == back % 2
-            contained[asked] = (there % 2 == 1) & ~free
-            asked = asked[~agreed & ~free]
-            if len(asked) == 0:
-                break
-        return contained
+        if placed.by_place is None:
+            placed.by_place = counts_by_place(placed, self._threads)
+        return contains(placed, places, placed.by_place, self._threads)
 
-    def _passes(self, placed: _Placed, points: Float64, direction: Float64) -> NDArray[np.int32]:
-        rays = _placed_rays(placed, points, np.broadcast_to(direction, points.shape))
-        return placed.scene.count(*rays, threads=self._threads)
+    def _hit_places(
+        self, placed: PlacedMesh, origins: Float64, directions: Float64, most: int | None
+    ) -> Found:
+        """One hit per place: all first ones, then all second ones, and so on."""
+        found, places = placed.every_hit(origins, directions, self._threads)
+        found = found.at(np.append(True, places[1:] != places[:-1])[: len(places)])
+        ray = found.ray
+        depth = np.arange(len(ray)) - np.searchsorted(ray, ray)
+        if len(ray) and depth.max() < 1 << 16:
+            depth = depth.astype(np.uint16)  # NumPy sorts 16-bit integers by radix
+        order = np.argsort(depth, kind="stable")
+        return found.at(order if most is None else order[: np.count_nonzero(depth < most)])
 
-    def _place(self) -> _Placed:
-        mesh_hash, placed = hash(self.mesh), self._placed
-        if placed is None or placed.mesh_hash != mesh_hash:
-            vertices, bounds = np.asarray(self.mesh.vertices, np.float64), self.mesh.bounds
-            origin, scale = np.zeros(3), 1.0
-            if bounds is not None:
-                origin = np.mean(bounds, axis=0, dtype=np.float64)
-                size = float(np.max(bounds[1] - bounds[0]))
-                if self._scale_to_box and 0 < size < np.inf:
-                    scale = 2.0 ** -round(np.log2(size))
-            placed_vertices = self._real.array((vertices - origin) * scale)
-            scene = Scene(placed_vertices, np.asarray(self.mesh.faces), **self._options)
-            self._placed = placed = _Placed(mesh_hash, scene, origin, scale)
-        return placed
+    def _placed_rays(
+        self, ray_origins: ArrayLike, ray_directions: ArrayLike
+    ) -> tuple[PlacedMesh, tuple[Floats, Floats]]:
+        origins, directions = _rays(ray_origins, ray_directions)
+        placed = self._place()
+        return placed, placed.rays(placed.near(origins, directions), directions)
 
-    def _locations(
-        self,
-        placed: _Placed,
-        hits: tuple[NDArray[np.int32], Floats, Int64],
-        origins: Float64,
-        directions: Float64,
-    ) -> Float64:
-        """(m,3) points where rays meet the planes of the triangles they hit, in the mesh's own float64."""
-        prim, uv, ray = hits
-        vertices = np.ascontiguousarray(self.mesh.vertices, np.float64)
-        return _cpu.points_on_rays(vertices, placed.scene.faces, prim, uv, ray, origins, directions)
+    def _place(self) -> PlacedMesh:
+        mesh_hash = hash(self.mesh)
+        if self._placed is None or self._placed[0] != mesh_hash:
+            placed = PlacedMesh(self.mesh, self._scale_to_box, self._real, self._options)
+            self._placed = mesh_hash, placed
+        return self._placed[1]
 
     def __getstate__(self) -> dict[str, Any]:
         """Everything but the tree, which is built again."""
@@ -226,18 +190,14 @@ class RayMeshIntersector:
 
 def _rays(ray_origins: ArrayLike, ray_directions: ArrayLike) -> tuple[Float64, Float64]:
     """Origins and unit directions, (n,3); NaN if a direction has no length."""
-    origins = np.asarray(ray_origins, np.float64)
-    directions = np.asarray(ray_directions, np.float64)
-    if origins.shape != directions.shape or origins.ndim != 2 or origins.shape[1] != 3:
+    origins = arguments.vectors("ray_origins", ray_origins, FLOAT64, may_be_one=False)
+    directions = arguments.vectors("ray_directions", ray_directions, FLOAT64, may_be_one=False)
+    if origins.shape != directions.shape:
         raise ValueError(
             "ray_origins and ray_directions must both have shape (n, 3), "
             f"got {origins.shape} and {directions.shape}"
         )
     with np.errstate(invalid="ignore", divide="ignore"):
-        lengths = np.sqrt(np.einsum("ij,ij->i", directions, directions))
-        return np.ascontiguousarray(origins), directions / lengths[:, None]
-
-
-def _placed_rays(placed: _Placed, origins: Float64, directions: Float64) -> tuple[Float64, Float64]:
-    """The rays in the scene's coordinates."""
-    return (origins - placed.origin) * placed.scale, directions
+        # Divided by their longest component first: squares of very long or short ones are no numbers.
+        directions = directions / np.abs(directions).max(axis=1, keepdims=True, initial=0)
+        return origins, directions / np.sqrt(np.einsum("ij,ij->i", directions, directions))[:, None]

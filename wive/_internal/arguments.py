@@ -224,13 +224,14 @@ def lanes(value: object) -> Lanes | None:
     return 8 if value == 8 else 1
 
 
-def vectors(name: str, value: ArrayLike, real: Real) -> Floats:
-    """Vectors (n,3), or one (3,) that all rays share, of `real`'s dtype, C-contiguous."""
+def vectors(name: str, value: ArrayLike, real: Real, may_be_one: bool = True) -> Floats:
+    """Vectors (n,3), or one (3,) that all rays share if it `may_be_one`, of `real`'s dtype, C-contiguous."""
     array = _numeric(name, value, "an (n, 3) array of real numbers", "fiu", masked=True)
     if array.shape == (0,):
         return real.array(array.reshape(0, 3))
-    if array.ndim not in (1, 2) or array.shape[-1] != 3:
-        raise ValueError(f"{name} must have shape (n, 3), or (3,) if all rays share it, got {array.shape}")
+    if array.ndim not in (1 if may_be_one else 2, 2) or array.shape[-1] != 3:
+        one = ", or (3,) if all rays share it" if may_be_one else ""
+        raise ValueError(f"{name} must have shape (n, 3){one}, got {array.shape}")
     return _missing_if_masked(name, value, array, real)
 
 

@@ -1,0 +1,106 @@
+"""A trimesh mesh moved to the coordinates' origin and scaled, the scene over it, and rays in the mesh's units."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wive import _cpu
+from wive._internal.distant import Ball
+from wive._internal.precision import Floats, Real
+from wive.scene import Scene
+
+Float64 = NDArray[np.float64]
+Int64 = NDArray[np.int64]
+
+# Hits of one ray that are at most this fraction of the mesh's size apart are in one place.
+SAME_PLACE = 1e-8
+# Differences of t, in units of the scene, that the scene's numbers may hide.
+UNSURE = {"float32": 2.0**-20, "float64": 2.0**-46}
+
+
+class Found(NamedTuple):
+    """Hits of rays, h in all: ray by ray, from near to far."""
+
+    ray: Int64
+    prim: NDArray[np.int32]
+    uv: Floats
+
+    def at(self, rows: NDArray[Any]) -> Found:
+        """Some of the hits."""
+        return Found(self.ray[rows], self.prim[rows], self.uv[rows])
+
+
+class PlacedMesh:
+    """The scene over one state of a mesh.
+
+    Triangles with a corner that is NaN or infinite keep their number and are never hit.
+    """
+
+    def __init__(self, mesh: Any, scale_to_box: bool, real: Real, options: dict[str, Any]) -> None:
+        """Build the tree."""
+        self.vertices: Float64 = np.ascontiguousarray(np.asarray(mesh.vertices, np.float64))
+        faces = np.asarray(mesh.faces)
+        if faces.size and not 0 <= faces.min() <= faces.max() < len(self.vertices):
+            face = int(np.argmax(((faces < 0) | (faces >= len(self.vertices))).any(axis=1)))
+            raise ValueError(
+                f"faces of the mesh must index its {len(self.vertices)} vertices from 0, "
+                f"got {faces[face].tolist()} in face {face}"
+            )
+        finite = np.isfinite(self.vertices).all(axis=1)
+        if finite.all():
+            bounds = mesh.bounds
+        else:
+            whole = finite[faces].all(axis=1)
+            self.vertices = np.where(finite[:, None], self.vertices, 0)
+            faces = np.where(whole[:, None], faces, 0)
+            corners = self.vertices[faces[whole]].reshape(-1, 3)
+            bounds = np.array([corners.min(axis=0), corners.max(axis=0)]) if len(corners) else None
+        self.bounds: Float64 = np.array([[np.inf] * 3, [-np.inf] * 3]) if bounds is None else np.array(bounds)
+        self._origin, self._scale, self.size = np.zeros(3), 1.0, 0.0
+        if bounds is not None:
+            self._origin = self.bounds.mean(axis=0)
+            self.size = float(np.max(self.bounds[1] - self.bounds[0]))
+            if scale_to_box and 0 < self.size < np.inf:
+                self._scale = 2.0 ** -round(np.log2(self.size))
+        self.by_place: bool | None = None  # what `inside.counts_by_place` says, when asked
+        self._real = real
+        self._ball = Ball.around(self.bounds)
+        self.scene = Scene(real.array((self.vertices - self._origin) * self._scale), faces, **options)
+
+    def near(self, origins: Float64, directions: Float64) -> Float64:
+        """The origins of rays, those far away moved along their rays to where the mesh is near."""
+        if not self._ball.may_have_far(origins):
+            return origins
+        steps = np.maximum(self._ball.steps(origins, directions), 0)
+        return np.where(steps[:, None] > 0, origins + steps[:, None] * directions, origins)
+
+    def rays(self, origins: Float64, directions: Float64) -> tuple[Floats, Floats]:
+        """The rays in the scene's units and dtype."""
+        with np.errstate(over="ignore", invalid="ignore"):
+            placed = (origins - self._origin) * self._scale
+        return self._real.array(placed), self._real.array(directions)
+
+    def points(self, found: Found, origins: Float64, directions: Float64) -> Float64:
+        """(h,3) points at which rays meet the planes of the triangles they hit, in the mesh's own float64."""
+        ray, prim, uv = found
+        return _cpu.points_on_rays(self.vertices, self.scene.faces, prim, uv, ray, origins, directions)
+
+    def every_hit(self, origins: Float64, directions: Float64, threads: int | None) -> tuple[Found, Int64]:
+        """All hits, and the number of the place of each: hits of one ray in one place have the same number."""
+        every = self.scene.intersect_all(*self.rays(origins, directions), threads=threads)
+        ray = every.ray
+        found, places = Found(ray, every.prim, every.uv), np.arange(len(ray))
+        unsure = UNSURE[self.scene.precision] * np.maximum(1, abs(every.t[1:]))
+        close = (ray[1:] == ray[:-1]) & (np.diff(every.t) <= unsure)
+        if not close.any():
+            return found, places
+        # In float64, hits that are close together are sorted again: t may have hidden their order.
+        along = self.points(found, origins, directions) - origins[ray]
+        distance = np.einsum("ij,ij->i", along, directions[ray])
+        order = np.lexsort((found.prim, distance, ray))
+        same = (np.diff(distance[order]) <= SAME_PLACE * self.size) & (ray[1:] == ray[:-1])
+        places[1:] = np.cumsum(~same)
+        return found.at(order), places
