@@ -111,11 +111,12 @@ class Hits(ReadOnly):
         """(n,) float64 upper bound on |t - t*|, in the unit of t; NaN on a miss.
 
         t* is the exact distance at which the ray, with vertices and rays in the scene's precision, meets the
-        plane of the triangle hit; rays that `intersect` moves are as they were given. The bound is proved for every accuracy, docs/accuracy.md, "The error of t".
-        It is inf if double arithmetic can't tell the ray from one in the plane. It comes in float64, because
-        what remains after t was rounded to float32 is far below what a float32 of that size resolves. For
-        float64 scenes most of the bound is the error that its own computation in double may have made: some
-        25 units in the last place of t if that is well-conditioned.
+        plane of the triangle hit; for float64 rays that start so far away that they are brought near before
+        they are rounded, the ray as it was given. The bound is proved for every accuracy, docs/accuracy.md,
+        "The error of t". It is inf if double arithmetic can't tell the ray from one in the plane. It comes in
+        float64, because what remains after t was rounded to float32 is far below what a float32 of that size
+        resolves. For float64 scenes most of the bound is the error that its own computation in double may
+        have made: some 25 units in the last place of t if that is well-conditioned.
 
         Computed at each call, from the arrays that held the rays: it is wrong if you have changed them.
         Raises ValueError if no scene returned these hits.

@@ -141,7 +141,7 @@ class RayMeshIntersector:
         the two disagree, another line is tried. Faces may be stored twice, turned or not, as in two-sided
         exports. Points on the surface may be inside or not.
         """
-        places = arguments.vectors("points", points, FLOAT64, may_be_one=False)
+        places = _rows("points", points)
         placed = self._place()
         if placed.by_place is None:
             placed.by_place = counts_by_place(placed, self._threads)
@@ -190,8 +190,7 @@ class RayMeshIntersector:
 
 def _rays(ray_origins: ArrayLike, ray_directions: ArrayLike) -> tuple[Float64, Float64]:
     """Origins and unit directions, (n,3); NaN if a direction has no length."""
-    origins = arguments.vectors("ray_origins", ray_origins, FLOAT64, may_be_one=False)
-    directions = arguments.vectors("ray_directions", ray_directions, FLOAT64, may_be_one=False)
+    origins, directions = _rows("ray_origins", ray_origins), _rows("ray_directions", ray_directions)
     if origins.shape != directions.shape:
         raise ValueError(
             "ray_origins and ray_directions must both have shape (n, 3), "
@@ -201,3 +200,8 @@ def _rays(ray_origins: ArrayLike, ray_directions: ArrayLike) -> tuple[Float64, F
         # Divided by their longest component first: squares of very long or short ones are no numbers.
         directions = directions / np.abs(directions).max(axis=1, keepdims=True, initial=0)
         return origins, directions / np.sqrt(np.einsum("ij,ij->i", directions, directions))[:, None]
+
+
+def _rows(name: str, value: ArrayLike) -> Float64:
+    """An (n,3) argument in float64, C-contiguous; masked numbers are NaN."""
+    return arguments.vectors(name, value, FLOAT64, may_be_one=False).astype(np.float64, copy=False)

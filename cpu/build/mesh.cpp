@@ -100,6 +100,17 @@ Float4v load_vertex(const Mesh<float>& mesh, std::int32_t index) {
     return std::bit_cast<Float4v>(bits & xyz);
 }
 
+// Which vertices are in a face. Any number may stand in the others.
+template <class Real>
+std::vector<bool> used_vertices(const Mesh<Real>& mesh) {
+    std::vector<bool> used(mesh.vertex_count);
+    for (std::size_t i = 0; i < 3 * mesh.face_count; ++i) {
+        const auto index = static_cast<std::uint32_t>(mesh.faces[i]);
+        if (index < mesh.vertex_count) used[index] = true;
+    }
+    return used;
+}
+
 }  // namespace
 
 template <class Real>
@@ -118,7 +129,12 @@ void check_mesh(const Mesh<Real>& mesh, Threads& threads) {
         return bad < 0;
     };
     const auto bad_vertex = [&](std::size_t i) { return bad_vertices(i, i + 1); };
-    if (const std::size_t i = first_bad(mesh.vertex_count, threads, bad_vertices, bad_vertex); i < mesh.vertex_count) {
+    std::size_t i = first_bad(mesh.vertex_count, threads, bad_vertices, bad_vertex);
+    if (i < mesh.vertex_count) {
+        const std::vector<bool> used = used_vertices(mesh);
+        while (i < mesh.vertex_count && !(used[i] && bad_vertex(i))) ++i;
+    }
+    if (i < mesh.vertex_count) {
         const Real* v = mesh.vertices + 3 * i;
         std::ostringstream text;
         text << "vertices[" << i << "] = (" << v[0] << ", " << v[1] << ", " << v[2]
@@ -135,11 +151,11 @@ void check_mesh(const Mesh<Real>& mesh, Threads& threads) {
         return static_cast<std::int32_t>(bad) < 0;
     };
     const auto bad_face = [&](std::size_t i) { return bad_faces(i, i + 1); };
-    if (const std::size_t i = first_bad(mesh.face_count, threads, bad_faces, bad_face); i < mesh.face_count) {
-        const std::int32_t* f = mesh.faces + 3 * i;
+    if (const std::size_t face = first_bad(mesh.face_count, threads, bad_faces, bad_face); face < mesh.face_count) {
+        const std::int32_t* f = mesh.faces + 3 * face;
         std::ostringstream text;
         text << "faces must index the " << mesh.vertex_count << " vertices from 0, got [" << f[0] << ", " << f[1]
-             << ", " << f[2] << "] in face " << i;
+             << ", " << f[2] << "] in face " << face;
         throw std::invalid_argument(text.str());
     }
 }

@@ -44,8 +44,8 @@ struct PrimRef {
     }
 };
 
-// Throws std::invalid_argument that names the first vertex that is not finite or beyond max_coordinate, or the first
-// face with an index outside the vertices.
+// Throws std::invalid_argument that names the first vertex that is not finite or beyond max_coordinate, if a face uses
+// it, or the first face with an index outside the vertices.
 template <class Real>
 void check_mesh(const Mesh<Real>& mesh, Threads& threads);
 

@@ -274,7 +274,7 @@ def _numeric(
     mend: str = "convert it first",
     masked: bool = False,
 ) -> NDArray[Any]:
-    """`value` as an array of these kinds of dtype; ValueError for masked numbers unless they may be `masked`."""
+    """`value` as an array of these kinds of dtype; ValueError if some are masked and may not be `masked`."""
     try:
         array = np.asarray(value)
     except (TypeError, ValueError):
@@ -283,7 +283,8 @@ def _numeric(
         raise TypeError(f"{name} must be {expected}, got dtype {array.dtype}: {mend}")
     if not masked and (mask := _mask(value)) is not None:
         raise ValueError(
-            f"{name} must be {expected}, got {np.count_nonzero(mask)} that are masked: fill or remove them first"
+            f"{name} must be {expected}, got {np.count_nonzero(mask)} that are masked: "
+            "fill or remove them first"
         )
     return array
 

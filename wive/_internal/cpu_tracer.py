@@ -31,7 +31,11 @@ class CpuTracer:
     def __init__(self, bvh: _cpu.Bvh, faces: NDArray[np.int32], backend: str) -> None:
         """Take the tree; the kernels are looked up by the first query."""
         self.bvh, self.backend = bvh, backend
-        self._faces, self._accuracy, self._real = faces, bvh.accuracy, real_of(bvh.vertices.dtype, bvh.accuracy)
+        self._faces, self._accuracy, self._real = (
+            faces,
+            bvh.accuracy,
+            real_of(bvh.vertices.dtype, bvh.accuracy),
+        )
         self._kernels = _cpu.Kernels(backend)
 
     @property

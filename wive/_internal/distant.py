@@ -1,7 +1,7 @@
 """Rays from far away, brought to the scene in float64 before they are rounded to float32.
 
-Rounding an origin or a direction to float32 moves a ray sideways by up to 1e-7 of the way to the scene. From 1e7
-sizes away that is the whole scene.
+Rounding an origin or a direction to float32 moves a ray sideways by up to 1e-7 of the way to the scene: from
+1e7 sizes away, by the size of the whole scene.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ class Ball(NamedTuple):
         return cls(center, radius, float(center.max()) - FAR * radius, float(center.min()) + FAR * radius)
 
     def may_have_far(self, origins: Floats) -> bool:
-        """Whether some origin (n,3) may be far; false for nearly all batches, at the cost of two reductions."""
+        """Whether some origin (n,3) may be far; two reductions show that none is in most batches."""
         if len(origins) == 0:
             return False
         if len(origins) < FEW:
@@ -100,7 +100,8 @@ def moved(rays: Rays, arrays: Traced, real: Real, ball: Ball) -> Moved | None:
         return None
     if real is not FLOAT32 or not ball.may_have_far(arrays[0]) or rays.are(np.dtype(np.float32)):
         return None
-    origins, directions, *_ = rays.numpy(FLOAT64)
+    given = rays.numpy(FLOAT64)
+    origins, directions = (rows.astype(np.float64, copy=False) for rows in given[:2])
     steps = ball.steps(origins, directions)
     is_moved = steps != 0
     if not is_moved.any():
@@ -110,7 +111,9 @@ def moved(rays: Rays, arrays: Traced, real: Real, ball: Ball) -> Moved | None:
     near[is_moved] = origins[is_moved] + steps[is_moved, None] * directions[is_moved]
     nearer = np.where(is_moved, _down(_middle(low, -np.inf) - steps), low)
     farther = np.where(is_moved, -_down(steps - _middle(high, np.inf)), high)
-    nearer = np.where(is_moved & (nearer < 0), np.float32(0), nearer)  # nothing lies behind where they are now
+    nearer = np.where(
+        is_moved & (nearer < 0), np.float32(0), nearer
+    )  # nothing lies behind where they are now
     nearer[is_moved & (low > high)] = np.inf
     return Moved((near, arrays[1], nearer, farther), (origins, directions), steps, (low, high))
 

@@ -1,8 +1,8 @@
 """Which points are inside a mesh: rays from there pass its surface an odd number of times.
 
-In a closed mesh each edge is in two triangles, and counting crossings is right. A mesh whose faces are all stored
-twice, as two-sided exports are, is passed twice in each place; there, places are counted. Two boxes that share a wall
-also have two triangles in one place, and there crossings are counted.
+In a closed mesh each edge is in two triangles, and crossings are counted. In a mesh whose faces are stored
+twice, as two-sided exports are, each place has two crossings, and places are counted. Two boxes that share a
+wall also have two triangles in one place; there, crossings are counted.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ def contains(placed: PlacedMesh, points: Float64, by_place: bool, threads: int |
 
 
 def counts_by_place(placed: PlacedMesh, threads: int | None) -> bool:
-    """Whether `contains` is to count places: faces are stored more than once, or the mesh has an open edge."""
+    """Whether `contains` counts places: if faces are stored more than once, or the mesh has an open edge."""
     corners = _position_keys(placed.vertices)[placed.scene.faces]
     is_triangle = (corners != np.roll(corners, 1, axis=1)).all(axis=1)
     corners = corners[is_triangle]
@@ -73,13 +73,14 @@ def _crossings(
     placed: PlacedMesh, points: Float64, direction: Float64, threads: int | None
 ) -> tuple[Int64, NDArray[np.bool_]]:
     rays = placed.rays(points, np.broadcast_to(direction, points.shape))
-    return placed.scene.count(*rays, threads=threads), np.ones(len(points), np.bool_)
+    counts = placed.scene.count(*rays, threads=threads).astype(np.int64)
+    return counts, np.ones(len(points), np.bool_)
 
 
 def _places_passed(
     placed: PlacedMesh, points: Float64, direction: Float64, threads: int | None
 ) -> tuple[Int64, NDArray[np.bool_]]:
-    """How many places each ray passes, and whether that is sure: at an edge it passes several planes at once."""
+    """How many places each ray passes, and whether that is sure: at an edge it passes several planes."""
     directions = np.tile(direction, (len(points), 1))
     found, places = placed.every_hit(points, directions, threads)
     is_first = np.append(True, places[1:] != places[:-1])[: len(places)]
@@ -93,7 +94,7 @@ def _places_passed(
 
 
 def _is_doubled_throughout(placed: PlacedMesh, threads: int | None) -> bool:
-    """Whether each place that a few rays pass holds an even number of triangles: these faces are stored twice."""
+    """Whether each place that a few rays pass holds an even number of triangles: faces are stored twice."""
     faces = placed.scene.faces
     rows = faces[np.linspace(0, len(faces) - 1, min(SAMPLES, len(faces)), dtype=np.intp)]
     directions = np.tile(DIRECTIONS[0], (len(rows), 1))
@@ -106,14 +107,14 @@ def _is_doubled_throughout(placed: PlacedMesh, threads: int | None) -> bool:
 def _unit_normals(placed: PlacedMesh, prim: NDArray[np.int32]) -> Float64:
     v0, v1, v2 = placed.vertices[placed.scene.faces[prim]].swapaxes(0, 1)
     normals = np.cross(v1 - v0, v2 - v0)
-    return normals / np.linalg.norm(normals, axis=1, keepdims=True)
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    return normals
 
 
 def _edge_degrees(corners: Uint64) -> Int64:
     """In how many triangles each edge is, by the keys (f,3) of their corners' positions."""
     keys = _mixed(corners)
-    _, degrees = np.unique(keys + np.roll(keys, 1, axis=1), return_counts=True)
-    return degrees
+    return np.asarray(np.unique(keys + np.roll(keys, 1, axis=1), return_counts=True)[1], np.int64)
 
 
 def _position_keys(vertices: Float64) -> Uint64:

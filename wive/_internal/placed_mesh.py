@@ -1,4 +1,4 @@
-"""A trimesh mesh moved to the coordinates' origin and scaled, the scene over it, and rays in the mesh's units."""
+"""The scene over a trimesh mesh that is moved to the coordinates' origin and scaled."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class PlacedMesh:
                 f"faces of the mesh must index its {len(self.vertices)} vertices from 0, "
                 f"got {faces[face].tolist()} in face {face}"
             )
-        finite = np.isfinite(self.vertices).all(axis=1)
+        finite = np.asarray(np.isfinite(self.vertices).all(axis=1))
         if finite.all():
             bounds = mesh.bounds
         else:
@@ -89,7 +89,7 @@ class PlacedMesh:
         return _cpu.points_on_rays(self.vertices, self.scene.faces, prim, uv, ray, origins, directions)
 
     def every_hit(self, origins: Float64, directions: Float64, threads: int | None) -> tuple[Found, Int64]:
-        """All hits, and the number of the place of each: hits of one ray in one place have the same number."""
+        """All hits, and a number for each: hits of one ray in one place have the same number."""
         every = self.scene.intersect_all(*self.rays(origins, directions), threads=threads)
         ray = every.ray
         found, places = Found(ray, every.prim, every.uv), np.arange(len(ray))

@@ -82,7 +82,7 @@ def refuse_rounded(name: str, given: ArrayLike, values: NDArray[Any], rounded: F
 
     NaN is kept: whether it is a vertex or a ray decides what it means.
     """
-    # NumPy makes one dtype of the numbers of lists and tables, which may round integers: see them as they were.
+    # NumPy gives the numbers of lists and tables one dtype, which may round integers.
     exact = values if isinstance(given, np.ndarray) else np.asarray(given, object).reshape(values.shape)
     with np.errstate(over="ignore", invalid="ignore"):
         # Compared in the dtype of the values: comparing int64 to float32 would round once more.
@@ -92,7 +92,9 @@ def refuse_rounded(name: str, given: ArrayLike, values: NDArray[Any], rounded: F
     kept = np.atleast_1d(kept)
     if not kept.all():
         row = int(np.argmin(kept.reshape(len(kept), -1).all(axis=1)))
-        place, number = (name, given) if values.ndim == 0 else (f"{name}[{row}]", exact[row].tolist())
+        place, number = (
+            (name, given) if values.ndim == 0 else (f"{name}[{row}]", np.asarray(exact[row]).tolist())
+        )
         rounding = f"{name}.astype(np.float32)" if values is exact else f"np.asarray({name}, np.float32)"
         raise ValueError(
             f"{name} must be float32 numbers for accuracy 'exact', got {place} = {number!s:.90}: "

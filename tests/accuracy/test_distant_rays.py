@@ -1,0 +1,110 @@
+"""float64 rays from far away hit what they hit from near by, and t is the distance from afar."""
+
+import numpy as np
+import pytest
+from support.meshes import sphere
+
+import wive
+
+DISTANCES = (1e3, 1e5, 1e7, 1e9, 1e12)
+
+
+@pytest.fixture(scope="module")
+def aimed():
+    """Points in a unit ball and unit directions, float64."""
+    random = np.random.default_rng(5)
+    targets, directions = random.uniform(-0.5, 0.5, (300, 3)), random.standard_normal((300, 3))
+    return targets, directions / np.linalg.norm(directions, axis=1, keepdims=True)
+
+
+@pytest.mark.parametrize("accuracy", ["fast", "watertight"])
+@pytest.mark.parametrize("nodes", ["float32", "compressed"])
+def test_rays_from_far_away_hit_what_they_hit_from_near_by(backend, accuracy, nodes, aimed):
+    if backend == "warp" and accuracy == "fast":
+        pytest.skip("the same path as watertight, and kernels of its own to compile")
+    scene = wive.Scene(*sphere(4), backend=backend, accuracy=accuracy, nodes=nodes)
+    targets, directions = aimed
+    near = scene.intersect(targets - 3 * directions, directions)
+    assert near.mask.all()
+    for distance in DISTANCES:
+        rays = targets - distance * directions, directions
+        hits, every = scene.intersect(*rays), scene.intersect_all(*rays)
+        lost = 3e-16 * distance  # what float64 resolves of the origins
+        np.testing.assert_allclose(hits.points(), near.points(), rtol=0, atol=2e-6 + 20 * lost)
+        np.testing.assert_allclose(hits.t, distance - 3 + near.t.astype(np.float64), rtol=1e-7)
+        assert (scene.count(*rays) == 2).all()
+        np.testing.assert_array_equal(every.t[every.offsets[:-1]], hits.t)
+        np.testing.assert_array_equal(every.prim[every.offsets[:-1]], hits.prim)
+        assert (np.diff(every.t.reshape(-1, 2)) >= 0).all()
+
+
+def test_limits_are_those_of_t_from_afar(backend, aimed):
+    scene = wive.Scene(*sphere(3), backend=backend)
+    targets, directions = aimed
+    for distance in DISTANCES:
+        rays = targets - distance * directions, 0.5 * directions
+        t, below, above = (scene.intersect(*rays).t for _ in range(3))
+        below, above = np.nextafter(t, np.float32(0)), np.nextafter(t, np.float32(np.inf))
+        last = scene.intersect_all(*rays).t.reshape(-1, 2)[:, 1]
+        for tmin, tmax, some in (
+            (0, t, True), (t, t, True), (t, np.inf, True), (-np.inf, np.inf, True),
+            (0, below, False), (0, 1, False), (np.nextafter(last, np.float32(np.inf)), np.inf, False),
+            (above, below, False), (np.inf, 0, False), (np.nan, np.inf, False), (0, np.nan, False),
+        ):  # fmt: skip
+            found = scene.intersect(*rays, tmin, tmax)
+            assert (found.mask == some).mean() > 0.98  # float32 resolves t from afar to half its last place
+            assert ((found.t >= tmin) & (found.t <= tmax))[found.mask].all()
+            np.testing.assert_array_equal(scene.occluded(*rays, tmin, tmax), found.mask)
+            np.testing.assert_array_equal(scene.count(*rays, tmin, tmax) > 0, found.mask)
+        assert scene.occluded(rays[0], -rays[1], -np.inf, 0).all()
+        assert not scene.occluded(rays[0], -rays[1]).any()
+
+
+def test_each_ray_is_moved_by_itself(backend, aimed):
+    scene = wive.Scene(*sphere(3), backend=backend)
+    targets, directions = aimed
+    distance = 10.0 ** np.random.default_rng(6).uniform(0, 9, len(targets))
+    origins = targets - distance[:, None] * directions
+    origins[7], directions = np.nan, directions.copy()
+    directions[11] = 0
+    together = scene.intersect(origins, directions)
+    assert together.mask.sum() == len(targets) - 2
+    for i in (0, 5, 7, 11, 50, 299):
+        alone = scene.intersect(origins[i : i + 1].tolist(), directions[i : i + 1].tolist())
+        for name in ("t", "prim", "uv"):
+            np.testing.assert_array_equal(getattr(alone, name)[0], getattr(together, name)[i])
+
+
+def test_float32_rays_and_exact_scenes_are_taken_as_they_are(backend, aimed):
+    targets, directions = aimed
+    rays = np.float32(targets - 1e7 * directions), np.float32(directions)
+    doubles = rays[0].astype(np.float64), rays[1].astype(np.float64)
+    exact = wive.Scene(*sphere(3), backend=backend, accuracy="exact")
+    np.testing.assert_array_equal(exact.intersect(*doubles).prim, exact.intersect(*rays).prim)
+    assert not exact.intersect(*rays).mask.all()
+    watertight = wive.Scene(*sphere(3), backend=backend)
+    np.testing.assert_array_equal(
+        watertight.intersect(*rays).prim, watertight.intersect(rays[0][:, ::1].copy("F"), rays[1]).prim
+    )
+
+
+def test_error_bounds_of_moved_rays_are_those_of_the_rays_given(aimed):
+    vertices, faces = sphere(3)
+    scene = wive.Scene(vertices, faces)
+    targets, directions = aimed
+    origins = targets - 1e6 * directions
+    hits = scene.intersect(origins, directions)
+    v0, v1, v2 = vertices.astype(np.float64)[faces[hits.prim]].swapaxes(0, 1)
+    normals = np.cross(v1 - v0, v2 - v0)
+    t = np.einsum("ij,ij->i", normals, v0 - origins) / np.einsum("ij,ij->i", normals, directions)
+    assert (abs(hits.t - t) <= hits.error_bound).all()
+    assert np.median(hits.error_bound) < 0.05
+
+
+def test_empty_scenes_and_origins_beyond_all_numbers_miss(backend):
+    empty = wive.Scene(np.zeros((0, 3), np.float32), np.zeros((0, 3), np.int32), backend=backend)
+    assert not empty.occluded([[1e7, 0, 0.1]], [[-1, 0, 0.0]]).any()
+    scene = wive.Scene(*sphere(1), backend=backend)
+    origins = np.array([[1e19, 0, 0], [1e300, 0, 0], [np.inf, 0, 0], [1e17, 0.01, 0]])
+    assert not scene.occluded(origins[:3], [-1.0, 0, 0]).any()
+    assert scene.occluded(origins, [-1.0, 0, 0]).tolist() == [False, False, False, True]
