@@ -170,7 +170,7 @@ def test_numbers_beyond_float32_are_ordinary_and_beyond_the_limit_named():
         broken = np.repeat(vertices.astype(np.float64), 7, axis=0)
         broken[17, 1] = value
         with pytest.raises(ValueError, match="17") as error:
-            wive.Scene(broken, faces)
+            wive.Scene(broken, faces + 16)
         assert "vert" in message(error)
 
 
