@@ -146,6 +146,7 @@ def test_other_encodings_prefixes_and_foreign_elements_are_ordinary():
             "object 1: triangle 0: expected indices below 4, found",
         ),
         ({"1": MESH + MESH}, ['objectid="1"'], "object 1: has a second mesh"),
+        ({"1&#10;2": MESH + MESH}, ['objectid="1"'], "object 1\\n2: has a second mesh"),
         ({"1": mesh(POINTS, [])}, ['objectid="1"'], "has no triangles"),
         ({"1": MESH + "</object><object id='1'>"}, ['objectid="1"'], "a second object '1'"),
         (
