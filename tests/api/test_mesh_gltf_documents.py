@@ -130,6 +130,14 @@ def test_chunks_of_other_kinds_are_passed_over():
     assert (corners(data + b"bytes after the end") == CORNERS).all()
 
 
+def test_whole_numbers_may_be_written_with_a_fraction_of_zero():
+    model, position, indices = square()
+    model.node(mesh=model.mesh(primitive(float(position), float(indices), mode=4.0)))
+    model.json["accessors"][0].update(count=4.0, componentType=5126.0, byteOffset=0.0)
+    model.json["scenes"][0]["nodes"] = [0.0]
+    assert (corners(model.glb()) == CORNERS).all()
+
+
 def damaged_container(data: bytes) -> dict[str, tuple[bytes, str]]:
     text_end = 20 + struct.unpack_from("<I", data, 12)[0]
     return {

@@ -1,4 +1,4 @@
-"""Readers of mesh files, one module per format; `wive.meshfile` chooses one and checks what it returns.
+"""Readers of mesh files, a module or folder per format; `wive.meshfile` chooses one and checks its results.
 
 A reader is `read(data, name)`: the file's bytes and its name for errors. It returns vertices (v,3) and
 triangles (f,3) in the file's own order, nothing merged or dropped. It raises ValueError in one line: the
