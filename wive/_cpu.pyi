@@ -30,6 +30,15 @@ def avx512_form() -> Literal["full", "half"]:
     is none of "full", "half" and "race".
     """
 
+def available_memory(root: str = "") -> int:
+    """Bytes that this process can still fill, the system's and its control groups' limits considered.
+
+    2^64 - 1 if the system doesn't tell. root: a folder that holds proc and sys, for tests.
+    """
+
+def expect_memory(bytes: int) -> None:
+    """Raise MemoryError unless as many bytes are available; amounts under 64 MiB are not checked."""
+
 class Kernels:
     """The kernels of one name, for the queries of `Bvh`: the first query with this handle looks them up."""
 
@@ -148,6 +157,7 @@ class Bvh:
         threads: int = 0,
         in_flight: int = 0,
         stats: bool = False,
+        max_bytes: int = 0,
     ) -> tuple[
         NDArray[np.int64],
         NDArray[Any],
@@ -157,8 +167,8 @@ class Bvh:
     ]:
         """All hits: offsets (n+1,), t (h,), prim (h,), uv (h,2), and stats (n,3) or None.
 
-        Those of ray i are rows offsets[i] to offsets[i+1], by ascending t, then prim. Raises MemoryError if
-        the hits don't fit.
+        Those of ray i are rows offsets[i] to offsets[i+1], by ascending t, then prim. Raises MemoryError as
+        soon as the hits take more than max_bytes; 0 is by what memory there is.
         """
     def count(
         self,

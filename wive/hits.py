@@ -9,9 +9,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from wive import _cpu
 from wive._internal import arguments
-from wive._internal.arrays import Library, host_array
+from wive._internal.arrays import Library
 from wive._internal.distant import Moved
 from wive._internal.error_bounds import t_error_bounds
+from wive._internal.host_arrays import host_array
 from wive._internal.precision import Floats, real_of
 from wive._internal.rays import Rays
 from wive._internal.read_only import ReadOnly

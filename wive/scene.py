@@ -10,10 +10,10 @@ from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from wive import _cpu
 from wive._internal import arguments
-from wive._internal.arguments import USUAL_WORK, USUAL_WORK_WITH_STATS, LanesOption, Work
-from wive._internal.arrays import host_array
+from wive._internal.arguments import USUAL_WORK, LanesOption, Work
 from wive._internal.cpu_tracer import CpuTracer
 from wive._internal.files import PathLike
+from wive._internal.host_arrays import host_array
 from wive._internal.precision import FLOAT64, Floats, Precision, real_of
 from wive._internal.rays import Rays, check_rays
 from wive._internal.storage import Options, read_scene, write_scene
@@ -26,7 +26,7 @@ from wive.meshfile import MeshSource, load_mesh
 if TYPE_CHECKING:
     from typing_extensions import Unpack
 
-    from wive._internal.arguments import Counted, Given, Plain
+    from wive._internal.arguments import Counted, CountedAll, Given, Plain, PlainAll
     from wive.warp_kernels import Tree
 
 Answer = TypeVar("Answer")
@@ -171,11 +171,21 @@ class Scene:
 
     @overload
     def intersect_all(
-        self, origins: Given, directions: Given, tmin: Given = 0, tmax: Given = np.inf, **how: Unpack[Plain]
+        self,
+        origins: Given,
+        directions: Given,
+        tmin: Given = 0,
+        tmax: Given = np.inf,
+        **how: Unpack[PlainAll],
     ) -> AllHits: ...
     @overload
     def intersect_all(
-        self, origins: Given, directions: Given, tmin: Given = 0, tmax: Given = np.inf, **how: Unpack[Counted]
+        self,
+        origins: Given,
+        directions: Given,
+        tmin: Given = 0,
+        tmax: Given = np.inf,
+        **how: Unpack[CountedAll],
     ) -> tuple[AllHits, Stats]: ...
     def intersect_all(
         self,
@@ -188,6 +198,7 @@ class Scene:
         in_flight: int | None = None,
         lanes: LanesOption = "auto",
         stats: bool = False,
+        max_bytes: int | None = None,
     ) -> AllHits | tuple[AllHits, Stats]:
         """Every triangle that each ray meets with tmin <= t <= tmax, each once, however many there are.
 
@@ -198,13 +209,23 @@ class Scene:
 
         CPU backends trace once; a hit takes 24 bytes until all are found, then 16 (in float64 40, then 28).
         Warp traces twice, to count and to fill, and waits for the device in between: CUDA graphs can't
-        capture this query.
+        capture this query. A hit takes 32 bytes there until all are sorted, then 16 (in float64 64, then 28).
 
-        Raises ValueError or TypeError, in one line naming the argument, and MemoryError if the hits don't fit
-        into memory (RuntimeError on a Warp device that is full).
+        Arguments:
+            max_bytes: what the hits may take while they are found and sorted. None is three quarters of the
+                memory that is available, control groups (containers) considered.
+
+        Raises ValueError or TypeError, in one line naming the argument, and MemoryError as soon as the hits
+        take more than `max_bytes`, which names their number so far, or don't fit into memory.
         """
         return self._query(
-            self._tracer.intersect_all, (origins, directions, tmin, tmax), threads, in_flight, lanes, stats
+            self._tracer.intersect_all,
+            (origins, directions, tmin, tmax),
+            threads,
+            in_flight,
+            lanes,
+            stats,
+            max_bytes,
         )
 
     @overload
@@ -337,14 +358,15 @@ class Scene:
         in_flight: int | None,
         lanes: LanesOption,
         stats: bool,
+        max_bytes: int | None = None,
     ) -> Answer | tuple[Answer, Stats]:
         """Check a query's arguments; its answer, with the counters if `stats`."""
         tracer = self._tracer
         checked = check_rays(*rays, tracer.backend, tracer.device)
-        if threads is None and in_flight is None and lanes == "auto":
-            work = USUAL_WORK_WITH_STATS if stats else USUAL_WORK
+        if threads is None and in_flight is None and lanes == "auto" and stats is False and max_bytes is None:
+            work = USUAL_WORK
         else:
-            work = arguments.work(tracer.backend, tracer.lacks, threads, in_flight, lanes, stats)
+            work = arguments.work(tracer.backend, tracer.lacks, threads, in_flight, lanes, stats, max_bytes)
         answer, counters = query(checked, work)
         return answer if counters is None else (answer, counters)
 

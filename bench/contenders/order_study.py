@@ -90,5 +90,5 @@ def _kernels(kernel: str) -> ctypes.CDLL:
         flags += ["-O3", *AVX512, *(["-fira-region=one"] if gcc else [])]
     else:
         flags += ["-O2", "-fpeel-loops"] if gcc else ["-O3"]
-    sources = [STUDY / "kernels_distance.cpp", CPU / "kernels" / "trace.cpp"]
+    sources = [STUDY / "kernels_distance.cpp", CPU / "kernels" / "trace.cpp", CPU / "core" / "memory.cpp"]
     return ctypes.CDLL(str(compiled(*sources, flags=flags, headers=[CPU, STUDY])))

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <stdexcept>
+#include <utility>
 
 #include "build/binary_tree.h"
 #include "build/emit.h"
@@ -22,6 +23,13 @@ constexpr std::uint32_t largest_leaf(Precision precision, NodeForm form) {
     return compressed_blocks ? max_compressed_leaf / block_width : max_leaf_blocks;
 }
 
+// The size of the smallest block of four triangles, in units.
+constexpr std::size_t fewest_block_units(Precision precision, NodeForm form) {
+    if (precision == Precision::float64) return TriangleBlockOf<double>::units();
+    return form == NodeForm::compressed ? CompressedBlock::units(CompressedBlock::few_vertices)
+                                        : TriangleBlock::units();
+}
+
 // On an axis, the centre leaves zero only if the mesh's middle is more than this many half extents away from it.
 constexpr double far_from_origin = 4;
 
@@ -32,15 +40,18 @@ Bvh::Bvh(const Mesh<Real>& mesh, const BuildOptions& options)
     : accuracy_(options.accuracy), precision_(precision_of<Real>), form_(options.nodes) {
     constexpr bool doubles = precision_of<Real> == Precision::float64;
     Threads threads(thread_count(options.threads));
-    if (mesh.face_count >= leaf_bit) throw std::invalid_argument("faces: too many triangles for one scene");
+    if (mesh.face_count >= leaf_bit) throw too_many_triangles(mesh.face_count);
     if (doubles && accuracy_ == Accuracy::exact)
         throw std::invalid_argument(
             "accuracy: 'exact' takes vertices in float32, got float64; round them, or use 'watertight'");
     check_mesh(mesh, threads);
     if constexpr (doubles) set_bounds(find_bounds(mesh, threads));
     const auto build_binary = [&] {
-        return build_binary_tree(make_prim_refs(mesh, center_, threads), threads, options.depth_limit,
-                                 largest_leaf(precision_, form_));
+        PrimRefs refs = make_prim_refs(mesh, center_, threads);
+        // Before the work: if full blocks alone are too large, emit_tree would refuse the tree.
+        if (refs.count / block_width * fewest_block_units(precision_, form_) > max_units)
+            throw too_many_triangles(refs.count);
+        return build_binary_tree(std::move(refs), threads, options.depth_limit, largest_leaf(precision_, form_));
     };
     BinaryTree tree = build_binary();
     if (options.quality == Quality::high) optimize_by_reinsertion(tree, threads);

@@ -76,7 +76,7 @@ public:
         }
         const std::size_t node_bytes = total.nodes * sizeof(StoredNode);
         const std::size_t bytes = node_bytes + total.leaf_units * unit_bytes;
-        if (bytes / unit_bytes > max_units) throw std::invalid_argument("faces: too many triangles for one scene");
+        if (bytes / unit_bytes > max_units) throw too_many_triangles(tree_.count);
         LargeArray<std::byte> units(bytes);
         nodes_ = reinterpret_cast<StoredNode*>(units.data());
         leaves_ = units.data() + node_bytes;

@@ -7,6 +7,7 @@
 #include <limits>
 #include <sstream>
 #include <stdexcept>
+#include <string>
 #include <type_traits>
 #include <vector>
 
@@ -116,7 +117,8 @@ std::vector<bool> used_vertices(const Mesh<Real>& mesh) {
 template <class Real>
 void check_mesh(const Mesh<Real>& mesh, Threads& threads) {
     if (mesh.vertex_count > std::numeric_limits<std::int32_t>::max())
-        throw std::invalid_argument("vertices: expected at most 2147483647, split the mesh into several scenes");
+        throw std::invalid_argument("vertices must be at most 2147483647 in one scene, got " +
+                                    std::to_string(mesh.vertex_count) + ": split the mesh into several scenes");
     // Branch-free, so that the compiler vectorises it. The bits of magnitudes compare as the magnitudes do; those of
     // infinities and NaNs are above all others.
     const auto bad_vertices = [&](std::size_t begin, std::size_t end) {
@@ -162,6 +164,11 @@ void check_mesh(const Mesh<Real>& mesh, Threads& threads) {
 
 template void check_mesh(const Mesh<float>&, Threads&);
 template void check_mesh(const Mesh<double>&, Threads&);
+
+std::invalid_argument too_many_triangles(std::size_t count) {
+    return std::invalid_argument("faces must be fewer in one scene, whose tree can have 8 GiB, got " +
+                                 std::to_string(count) + " triangles: split the mesh into several scenes");
+}
 
 bool box_triangle(const Mesh<float>& mesh, const Point&, std::size_t face, Box& box) {
     const std::int32_t* corners = mesh.faces + 3 * face;

@@ -6,6 +6,7 @@
 #include <cassert>
 #include <cstddef>
 #include <cstdint>
+#include <stdexcept>
 
 #include "core/box.h"
 #include "core/large_array.h"
@@ -48,6 +49,9 @@ struct PrimRef {
 // it, or the first face with an index outside the vertices.
 template <class Real>
 void check_mesh(const Mesh<Real>& mesh, Threads& threads);
+
+// The error for more triangles than a tree can address.
+std::invalid_argument too_many_triangles(std::size_t count);
 
 using Point = std::array<float, 3>;
 

@@ -6,8 +6,9 @@
 #include <cstddef>
 #include <cstdlib>
 #include <memory>
-#include <new>
 #include <type_traits>
+
+#include "core/memory.h"
 
 #if defined(__linux__)
 #include <sys/mman.h>
@@ -27,8 +28,9 @@ public:
         const std::size_t bytes = size * sizeof(T);
         const std::size_t alignment = bytes >= huge_page ? huge_page : cache_line;
         const std::size_t rounded = (bytes + alignment - 1) / alignment * alignment;
+        expect_memory(rounded);
         data_.reset(static_cast<T*>(std::aligned_alloc(alignment, rounded)));
-        if (!data_) throw std::bad_alloc();
+        if (!data_) throw OutOfMemory("not enough memory: can't allocate " + bytes_text(rounded));
 #if defined(__linux__)
         if (alignment == huge_page) madvise(data_.get(), rounded, MADV_HUGEPAGE);
 #endif

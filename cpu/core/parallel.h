@@ -13,6 +13,8 @@
 #include <thread>
 #include <vector>
 
+#include "core/memory.h"
+
 #if defined(__linux__)
 #include <sched.h>
 #endif
@@ -43,7 +45,9 @@ void yield_until(const Ready& ready) {
 // the calling thread does the work alone.
 class Threads {
 public:
-    explicit Threads(unsigned count) : count_(count) {}
+    explicit Threads(unsigned count) : count_(count) {
+        static_cast<void>(std::uncaught_exceptions());  // for the calling thread, see can_throw()
+    }
     Threads(const Threads&) = delete;
     Threads& operator=(const Threads&) = delete;
     ~Threads() {
@@ -93,6 +97,10 @@ private:
         } catch (...) {
             // The system refused another thread: those that exist do the work.
         }
+        if (requests_can_fail()) {  // before this thread takes the memory that they begin with
+            std::unique_lock lock(mutex_);
+            idle_.wait(lock, [this] { return begun_ == helpers_.size(); });
+        }
         {
             const std::lock_guard lock(mutex_);
             job_ = &job;
@@ -114,6 +122,13 @@ private:
 
     // A helper's loop.
     void help() {
+        {
+            const std::lock_guard lock(mutex_);
+            ++begun_;
+            const bool works = can_throw();
+            idle_.notify_one();
+            if (!works) return;  // the other threads do the work
+        }
         for (std::size_t last = 0;;) {
             yield_until([&] { return ending_ || job_number_ != last; });
             std::unique_lock lock(mutex_);
@@ -140,6 +155,7 @@ private:
     std::condition_variable wake_, idle_;
     // Written under the mutex. The atomic ones are read without it while yielding.
     Job* job_ = nullptr;                       // null: no work
+    std::size_t begun_ = 0;                    // helpers that run
     std::atomic<std::size_t> job_number_ = 0;  // tells jobs apart, so that a helper takes each once
     std::atomic<unsigned> working_ = 0;
     std::atomic<bool> ending_ = false;

@@ -35,7 +35,12 @@ void trace(const KernelTable<Real>& table, TraceBatch<Real> kernel, const BvhVie
         LargeArray<std::byte> scratch(in_flight > 1 ? in_flight * table.flight_bytes : 0);
         HitBatch<Real> own = hits;
         if (own.found) own.found += worker;
-        kernel(bvh, rays, own, source, in_flight, scratch.data());  // -> trace_batch() in traverse/in_flight.h
+        try {
+            kernel(bvh, rays, own, source, in_flight, scratch.data());  // -> trace_batch() in traverse/in_flight.h
+        } catch (...) {
+            __atomic_store_n(&next, count, __ATOMIC_RELAXED);  // no thread takes more rays
+            throw;
+        }
     };
     const unsigned workers = worker_count(count, threads);
     parallel_for(workers, workers, work);

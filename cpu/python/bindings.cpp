@@ -1,7 +1,10 @@
 // The Python module: the tree and the renderer.
+#include <new>
 #include <optional>
 #include <span>
+#include <stdexcept>
 
+#include "core/memory.h"
 #include "core/parallel.h"
 #include "exact_source.h"
 #include "kernels/avx512_form.h"
@@ -120,6 +123,20 @@ py::array_t<float> copy(const std::array<float, n>& values) {
 PYBIND11_MODULE(_cpu, m, pybind11::mod_gil_not_used()) {
     using namespace wive;
     m.doc() = "The compiled core of wive.";
+    // pybind11 makes MemoryErrors of OutOfMemory, with its text. What the standard library throws has none for users.
+    py::register_local_exception_translator([](std::exception_ptr thrown) {
+        try {
+            std::rethrow_exception(std::move(thrown));
+        } catch (const OutOfMemory&) {
+            throw;
+        } catch (const std::bad_alloc&) {
+            PyErr_SetString(PyExc_MemoryError, "not enough memory");
+        } catch (const std::length_error&) {  // a vector larger than the address space
+            PyErr_SetString(PyExc_MemoryError, "not enough memory");
+        }
+    });
+    m.def("available_memory", &available_memory, py::arg("root") = "");
+    m.def("expect_memory", &expect_memory, py::arg("bytes"));
     m.attr("compiler") = compiler_name;
     m.attr("exact_source") = exact_source;
     m.def("kernels", [] {

@@ -1,6 +1,7 @@
 // The ray queries of a tree, as Python calls them.
 #include <optional>
 
+#include "core/memory.h"
 #include "kernels/hit_collector.h"
 #include "kernels/trace.h"
 #include "python/bindings.h"
@@ -31,8 +32,13 @@ struct QueryCall {
     py::ssize_t count;
     unsigned threads, in_flight;
     bool stats;
+    std::size_t max_bytes = 0;  // intersect_all: what hits may take
 
     std::size_t size() const { return static_cast<std::size_t>(count); }
+    // Throws OutOfMemory if there is no room for outputs of so many bytes per ray.
+    void expect_room(std::size_t ray_bytes) const {
+        expect_memory(size() * (ray_bytes + (stats ? 3 * sizeof(std::int32_t) : 0)));
+    }
     TraceBatch<Real> kernel(QueryKind query) const {
         return kernels.find({query, tree.bvh().accuracy(), tree.bvh().node_form(), stats});
     }
@@ -63,6 +69,7 @@ void trace_released(const QueryCall<Real>& call, QueryKind query, const HitBatch
 
 template <class Real>
 py::tuple intersect(const QueryCall<Real>& call) {
+    call.expect_room(3 * sizeof(Real) + sizeof(std::int32_t));
     Array<Real> t(call.count), uv({call.count, py::ssize_t{2}});
     Array<std::int32_t> prim(call.count);
     StepCounts steps(call);
@@ -77,6 +84,7 @@ py::tuple intersect(const QueryCall<Real>& call) {
 
 template <class Real>
 py::tuple occluded(const QueryCall<Real>& call) {
+    call.expect_room(sizeof(bool));
     Array<bool> mask(call.count);
     StepCounts steps(call);
     HitBatch<Real> hits;
@@ -88,6 +96,7 @@ py::tuple occluded(const QueryCall<Real>& call) {
 
 template <class Real>
 py::tuple count(const QueryCall<Real>& call) {
+    call.expect_room(sizeof(std::int32_t));
     Array<std::int32_t> counts(call.count);
     StepCounts steps(call);
     HitBatch<Real> hits;
@@ -99,6 +108,7 @@ py::tuple count(const QueryCall<Real>& call) {
 
 template <class Real>
 py::tuple intersect_all(const QueryCall<Real>& call) {
+    call.expect_room(sizeof(std::int64_t) + sizeof(std::int32_t));
     Array<std::int64_t> offsets(call.count + 1);
     StepCounts steps(call);
     const TraceBatch<Real> kernel = call.kernel(QueryKind::all);
@@ -108,7 +118,8 @@ py::tuple intersect_all(const QueryCall<Real>& call) {
     std::optional<HitCollector<Real>> collector;
     {
         py::gil_scoped_release release;
-        collector.emplace(call.kernels, kernel, bvh, call.rays, call.size(), steps_data, call.threads, call.in_flight);
+        collector.emplace(call.kernels, kernel, bvh, call.rays, call.size(), steps_data, call.threads, call.in_flight,
+                          call.max_bytes);
         collector->write_offsets(offsets_data);
     }
     const auto total = static_cast<py::ssize_t>(offsets_data[call.count]);
@@ -123,17 +134,19 @@ py::tuple intersect_all(const QueryCall<Real>& call) {
     return py::make_tuple(std::move(offsets), std::move(t), std::move(prim), std::move(uv), steps.take());
 }
 
-template <class Real>
-void define_query(PyBvhClass& bvh, const char* name, py::tuple (*query)(const QueryCall<Real>&)) {
+// More: the types of the arguments that only this query has, the last of QueryCall; arg: their names and defaults.
+template <class Real, class... More, class... Arg>
+void define_query(PyBvhClass& bvh, const char* name, py::tuple (*query)(const QueryCall<Real>&), const Arg&... arg) {
+    static_assert(sizeof...(More) == sizeof...(Arg));
     const auto call = [query](const PyBvh& self, const KernelArg& kernel, const Array<Real>& origins,
                               const Array<Real>& directions, const Array<Real>& tmin, const Array<Real>& tmax,
-                              unsigned threads, unsigned in_flight, bool stats) {
+                              unsigned threads, unsigned in_flight, bool stats, More... more) {
         self.expect_precision<Real>();
         const RayBatch<Real> rays = ray_batch(origins, directions, tmin, tmax);
-        return query({self, table_of<Real>(kernel), rays, origins.shape(0), threads, in_flight, stats});
+        return query({self, table_of<Real>(kernel), rays, origins.shape(0), threads, in_flight, stats, more...});
     };
     bvh.def(name, call, py::arg("kernel"), array_arg("origins"), array_arg("directions"), array_arg("tmin"),
-            array_arg("tmax"), py::arg("threads") = 0, py::arg("in_flight") = 0, py::arg("stats") = false);
+            array_arg("tmax"), py::arg("threads") = 0, py::arg("in_flight") = 0, py::arg("stats") = false, arg...);
 }
 
 }  // namespace
@@ -142,7 +155,7 @@ void bind_queries(PyBvhClass& bvh) {
     for_each_precision([&]<class Real>(Real) {
         define_query<Real>(bvh, "intersect", intersect);
         define_query<Real>(bvh, "occluded", occluded);
-        define_query<Real>(bvh, "intersect_all", intersect_all);
+        define_query<Real, std::size_t>(bvh, "intersect_all", intersect_all, py::arg("max_bytes") = 0);
         define_query<Real>(bvh, "count", count);
     });
 }

@@ -5,6 +5,7 @@
 #include <limits>
 #include <type_traits>
 
+#include "core/memory.h"
 #include "core/parallel.h"
 #include "python/bindings.h"
 #include "surface_source.h"
@@ -59,6 +60,7 @@ void for_each_hit(const Array<Real>& vertices, const Array<std::int32_t>& faces,
 // An array of three columns.
 template <class T>
 py::array_t<T> make_rows(py::ssize_t count) {
+    expect_memory(3 * sizeof(T) * static_cast<std::size_t>(count));
     return py::array_t<T>({count, py::ssize_t{3}});
 }
 
@@ -165,6 +167,7 @@ py::array_t<double> error_bounds(const Array<Real>& vertices, const Array<std::i
     const auto [rounding, margin, underflow] = constants;
     const ErrorBound error = {rounding, margin, underflow};
     const Real *distances = t.data(), *from = origins.data(), *along = directions.data();
+    expect_memory(sizeof(double) * static_cast<std::size_t>(prim.size()));
     py::array_t<double> answer(prim.size());
     double* out = answer.mutable_data();
     for_each_hit(vertices, faces, prim, [=](std::size_t i, TriangleCorners corner) {

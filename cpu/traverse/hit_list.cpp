@@ -1,6 +1,10 @@
 #include "traverse/hit_list.h"
 
 #include <algorithm>
+#include <new>
+
+#include "core/memory.h"
+#include "traverse/hit_budget.h"
 
 namespace wive {
 namespace {
@@ -17,9 +21,15 @@ HitList<Real>::~HitList() = default;
 
 template <class Real>
 void HitList<Real>::grow() {
-    const std::size_t size = chunks_.empty() ? first_chunk : std::min(2 * chunks_.back().size(), largest_chunk);
-    LargeArray<FoundHit>& chunk = chunks_.emplace_back(size);
-    next_ = chunk.data();
+    const std::size_t full = chunks_.empty() ? 0 : chunks_.back().size();
+    if (full > 0) budget_->add(full);
+    const std::size_t size = full == 0 ? first_chunk : std::min(2 * full, largest_chunk);
+    try {
+        chunks_.emplace_back(size);
+    } catch (const std::bad_alloc&) {
+        budget_->no_memory();
+    }
+    next_ = chunks_.back().data();
     end_ = next_ + size;
 }
 

@@ -11,6 +11,8 @@
 
 namespace wive {
 
+class HitBudget;
+
 template <class Real>
 struct FoundHit {
     std::size_t ray;  // in its batch
@@ -29,7 +31,10 @@ public:
     HitList();
     ~HitList();
 
-    // Throws std::bad_alloc, with the list unchanged.
+    // Must be called before the first hit is added.
+    void take_from(HitBudget& budget) { budget_ = &budget; }
+
+    // Throws OutOfMemory if the budget or the memory has no room, with the list unchanged.
     [[gnu::always_inline]] void add(const FoundHit& hit) {
         assert(hit.prim >= 0);
         if (next_ == end_) [[unlikely]]
@@ -53,6 +58,7 @@ private:
     void grow();
 
     FoundHit *next_ = nullptr, *end_ = nullptr;  // the free part of the last chunk
+    HitBudget* budget_ = nullptr;
     std::vector<LargeArray<FoundHit>> chunks_;
 };
 

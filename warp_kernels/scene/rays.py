@@ -15,6 +15,8 @@ from wive.warp_kernels.lanes.precision import PRECISIONS, precision_of
 
 # Limits that nearly every query has, made once per scene.
 COMMON_LIMITS = (0.0, float("inf"))
+# Warp arrays hold no more.
+MOST_RAYS = 2**31 - 1
 
 
 @dataclass(frozen=True)
@@ -52,6 +54,11 @@ class RayLoader:
         `arrays` are what `rays.numpy` returned, if it was asked before.
         """
         origins, directions, tmin, tmax = arrays or rays.numpy(self.numbers)
+        if len(origins) > MOST_RAYS:
+            raise ValueError(
+                f"origins must be at most {MOST_RAYS} for backend 'warp', got {len(origins)}: "
+                "pass fewer at a time"
+            )
         return WarpRays(
             wp.array(origins, dtype=self._vec3, device=self.device, copy=False),
             wp.array(directions, dtype=self._vec3, device=self.device, copy=False),

@@ -21,7 +21,6 @@ from wive._internal.wrapping import Wrapping
 from wive.all_hits import AllHits, WrappedAllHits
 from wive.hits import Hits, Stats, WrappedHits
 from wive.warp_kernels import (
-    MOST_HITS,
     check,
     launch_all,
     launch_any,
@@ -32,6 +31,7 @@ from wive.warp_kernels import (
 )
 from wive.warp_kernels.lanes.precision import PRECISIONS
 from wive.warp_kernels.scene.hits import WarpAllHits, WarpHits
+from wive.warp_kernels.scene.memory import expect_hits_fit, memory_errors
 from wive.warp_kernels.scene.rays import RayLoader, WarpRays
 
 # For fewer rays eight threads per ray keep a GPU busy and return sooner; for more, one thread per ray traces
@@ -57,7 +57,8 @@ class WarpTracer:
         self.bvh, self.device = bvh, device
         self.vertices, self.faces = bvh.vertices, faces
         self.accuracy, self.precision = bvh.accuracy, bvh.precision
-        self.tree = upload(bvh, device)
+        with memory_errors():
+            self.tree = upload(bvh, device)
         self.loader = RayLoader(device, real_of(bvh.vertices.dtype, bvh.accuracy))
         self._numbers = PRECISIONS[bvh.precision]
         wp.synchronize_stream(device)
@@ -85,7 +86,7 @@ class WarpTracer:
 
     def intersect(self, rays: Rays, work: Work) -> tuple[Hits, Stats | None]:
         """Closest hits."""
-        with rays.library.on_stream(self.device):
+        with rays.library.on_stream(self.device), memory_errors():
             loaded, near = self._load(rays)
             t, prim, uv = self._outputs(len(loaded))
             steps = self._steps(len(loaded), work)
@@ -101,7 +102,7 @@ class WarpTracer:
 
     def occluded(self, rays: Rays, work: Work) -> tuple[Any, Stats | None]:
         """(n,) bool, whether anything is hit."""
-        with rays.library.on_stream(self.device):
+        with rays.library.on_stream(self.device), memory_errors():
             loaded, _ = self._load(rays)
             mask = wp.empty(len(loaded), dtype=wp.bool, device=self.device)
             steps = self._steps(len(loaded), work)
@@ -110,22 +111,18 @@ class WarpTracer:
 
     def count(self, rays: Rays, work: Work) -> tuple[Any, Stats | None]:
         """(n,) int32, the number of hits."""
-        with rays.library.on_stream(self.device):
+        with rays.library.on_stream(self.device), memory_errors():
             counts, steps = self._count(self._load(rays)[0], work)
             return self._returned(counts, steps, rays)
 
     def intersect_all(self, rays: Rays, work: Work) -> tuple[AllHits, Stats | None]:
         """All hits: one pass counts them, which makes room for the pass that lists them."""
-        with rays.library.on_stream(self.device):
+        with rays.library.on_stream(self.device), memory_errors():
             loaded, near = self._load(rays)
             counts, steps = self._count(loaded, work)
             offsets = scan_counts(counts)
             total = int(offsets[-1:].numpy()[0])
-            if total > MOST_HITS:
-                raise MemoryError(
-                    f"{total} hits are more than a Warp array holds ({MOST_HITS}): "
-                    "split the rays into batches"
-                )
+            expect_hits_fit(total, self.precision, self.device, work.max_bytes)
             t, prim, uv = self._outputs(total)
             lanes = self._lanes(work, loaded)
             launch_all(self.tree, *_arrays(loaded), counts, offsets, t, prim, uv, lanes=lanes)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import operator
 import sys
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Literal, NamedTuple, TypedDict, TypeGuard
@@ -12,6 +11,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from wive._internal.precision import FLOAT32, Floats, Real, real_of
+from wive._internal.room import expect_room
+from wive._internal.scalars import MOST_COUNT, unreadable
+from wive._internal.scalars import choice as choice
+from wive._internal.scalars import flag as flag
+from wive._internal.scalars import integer as integer
+from wive._internal.scalars import real as real
 
 Given = ArrayLike  # what users pass, by a name short enough for overloads
 Int32 = NDArray[np.int32]
@@ -20,9 +25,9 @@ LanesOption = Literal["auto", 8, 1]
 
 # The options that not every backend has, and which backends have them.
 HAVE_OPTION = {"threads": "CPU backends", "in_flight": "CPU backends", "lanes": "backend 'warp'"}
-# More threads than this only cost memory; the core takes 32-bit counts.
+# More threads than this only cost memory.
 MOST_THREADS = 4096
-MOST_COUNT = 2**31 - 1
+MOST_BYTES = 2**63 - 1
 
 
 class QueryOptions(TypedDict, total=False):
@@ -45,6 +50,18 @@ class Counted(QueryOptions):
     stats: Literal[True]
 
 
+class PlainAll(Plain, total=False):
+    """The options of a query for all hits that returns no counters."""
+
+    max_bytes: int | None
+
+
+class CountedAll(Counted, total=False):
+    """The options of a query for all hits that returns counters."""
+
+    max_bytes: int | None
+
+
 class Work(NamedTuple):
     """The options of a query, checked."""
 
@@ -52,41 +69,13 @@ class Work(NamedTuple):
     in_flight: int = 0  # 0 leaves it to the core
     stats: bool = False
     lanes: Lanes | None = None  # None leaves it to the Warp backend
+    max_bytes: int = 0  # of all hits; 0 is by what memory there is
 
 
 # `Work` of a tuple, in a third of the time that `Work(...)` takes.
 _work = functools.partial(tuple.__new__, Work)
 # If no option is given: made once, because making it takes a tenth of the time of a one-ray query.
-USUAL_WORK, USUAL_WORK_WITH_STATS = Work(), Work(stats=True)
-
-
-def choice(name: str, value: object, allowed: Iterable[str]) -> None:
-    """Raise ValueError unless `value` is one of the allowed names."""
-    allowed = tuple(allowed)
-    if not isinstance(value, str) or value not in allowed:
-        raise ValueError(f"{name} must be one of {', '.join(allowed)} in this version of wive, got {value!r}")
-
-
-def integer(name: str, value: object, lowest: int, highest: int = MOST_COUNT) -> int:
-    """`value` as an int within [lowest, highest]."""
-    try:
-        number = operator.index(value)  # type: ignore[arg-type]
-    except TypeError:
-        raise TypeError(f"{name} must be an integer, got {_described(value)}") from None
-    if not lowest <= number <= highest:
-        raise ValueError(f"{name} must be from {lowest} to {highest}, got {number}")
-    return number
-
-
-def real(name: str, value: object) -> float:
-    """`value` as a finite float."""
-    try:
-        number = float(value)  # type: ignore[arg-type]
-    except (TypeError, ValueError):
-        raise TypeError(f"{name} must be a real number, got {_described(value)}") from None
-    if not np.isfinite(number):
-        raise ValueError(f"{name} must be finite, got {number}")
-    return number
+USUAL_WORK = Work()
 
 
 def vector(name: str, value: ArrayLike) -> NDArray[np.float64]:
@@ -94,9 +83,27 @@ def vector(name: str, value: ArrayLike) -> NDArray[np.float64]:
     array = _numeric(name, value, "three real numbers", "fiu")
     if array.shape != (3,):
         raise ValueError(f"{name} must be three real numbers, got an array of shape {array.shape}")
-    if not np.isfinite(array).all():
-        raise ValueError(f"{name} must be finite, got {array.tolist()}")
-    return array.astype(np.float64)
+    numbers = _doubles(array)
+    if not np.isfinite(numbers).all():
+        raise ValueError(f"{name} must be finite, got {numbers.tolist()}")
+    return numbers
+
+
+def bounds(value: ArrayLike, largest: float) -> NDArray[np.float64]:
+    """The lowest and the highest corner of a box, (2,3) float64."""
+    array = _numeric("bounds", value, "a (2, 3) array of real numbers", "fiu")
+    if array.shape != (2, 3):
+        raise ValueError(
+            f"bounds must have shape (2, 3), the lowest and the highest corner, got {array.shape}"
+        )
+    corners = _doubles(array)
+    if not np.isfinite(corners).all():
+        raise ValueError("bounds must be finite to be framed: the mesh has no triangle that can be hit")
+    if (corners[0] > corners[1]).any():
+        raise ValueError(f"bounds must be the lowest and then the highest corner, got {corners.tolist()}")
+    if np.max(abs(corners)) > largest:
+        raise ValueError(f"bounds must be at most {largest:.3g} in magnitude, got {corners.tolist()}")
+    return corners
 
 
 def mesh(vertices: ArrayLike, faces: ArrayLike, accuracy: str = "watertight") -> tuple[Floats, Int32]:
@@ -109,6 +116,8 @@ def mesh(vertices: ArrayLike, faces: ArrayLike, accuracy: str = "watertight") ->
         raise ValueError(
             f"faces must have shape (f, 3), one row of three vertex indices per triangle, got {corners.shape}"
         )
+    _expect_addressable("faces", corners)
+    expect_room(corners.size, np.int32)
     fits = np.can_cast(corners.dtype, np.int32)
     # The core refuses indices out of range in the same words, but those beyond int32 would wrap on the way.
     if not fits and corners.size and (corners.min() < -MOST_COUNT - 1 or corners.max() > MOST_COUNT):
@@ -153,9 +162,9 @@ def rays(
     if origin_rows.ndim == direction_rows.ndim == 1:
         origin_rows, direction_rows = origin_rows[None], direction_rows[None]
     elif origin_rows.ndim == 1:
-        origin_rows = np.tile(origin_rows, (len(direction_rows), 1))
+        origin_rows = _repeated(origin_rows, len(direction_rows))
     elif direction_rows.ndim == 1:
-        direction_rows = np.tile(direction_rows, (len(origin_rows), 1))
+        direction_rows = _repeated(direction_rows, len(origin_rows))
     count = len(origin_rows)
     if len(direction_rows) != count:
         raise ValueError(
@@ -196,10 +205,13 @@ def work(
     asked_in_flight: int | None,
     asked_lanes: LanesOption,
     stats: bool,
+    max_bytes: int | None = None,
 ) -> Work:
     """The options of a query, checked; ValueError for one that the backend lacks."""
     chosen = None if asked_lanes == "auto" else lanes(asked_lanes)
-    checked = _work((threads(asked_threads), in_flight(asked_in_flight), bool(stats), chosen))
+    limit = 0 if max_bytes is None else integer("max_bytes", max_bytes, 1, MOST_BYTES)
+    flags = flag("stats", stats), chosen, limit
+    checked = _work((threads(asked_threads), in_flight(asked_in_flight), *flags))
     refuse_lacking(backend, lacks, {"threads": asked_threads, "in_flight": asked_in_flight, "lanes": chosen})
     return checked
 
@@ -263,7 +275,27 @@ def _positions(vertices: ArrayLike) -> NDArray[Any]:
         points = points.reshape(0, 3)
     if points.ndim != 2 or points.shape[1] != 3:
         raise ValueError(f"vertices must have shape (v, 3), got {points.shape}")
+    _expect_addressable("vertices", points)
     return points
+
+
+def _expect_addressable(name: str, rows: NDArray[Any]) -> None:
+    """Raise ValueError for more rows than 32-bit indices tell apart, before anything is done with them."""
+    if len(rows) > MOST_COUNT:
+        raise ValueError(
+            f"{name} must be at most {MOST_COUNT} in one scene, got {len(rows)}: split the mesh into several"
+        )
+
+
+def _doubles(array: NDArray[Any]) -> NDArray[np.float64]:
+    """The numbers as float64, in which those of longdouble may be infinite."""
+    with np.errstate(over="ignore"):
+        return array.astype(np.float64)
+
+
+def _repeated(vector: Floats, count: int) -> Floats:
+    expect_room(count * len(vector), vector.dtype)
+    return np.tile(vector, (count, 1))
 
 
 def _numeric(
@@ -277,8 +309,10 @@ def _numeric(
     """`value` as an array of these kinds of dtype; ValueError if some are masked and may not be `masked`."""
     try:
         array = np.asarray(value)
-    except (TypeError, ValueError):
-        raise ValueError(f"{name} must be {expected}, got rows of unequal length") from None
+    except (TypeError, ValueError) as error:
+        if isinstance(value, (list, tuple)):
+            raise ValueError(f"{name} must be {expected}, got rows of unequal length") from None
+        raise unreadable(name, value, error) from None
     if array.dtype.kind not in kinds and array.shape != (0,):
         raise TypeError(f"{name} must be {expected}, got dtype {array.dtype}: {mend}")
     if not masked and (mask := _mask(value)) is not None:
@@ -309,7 +343,3 @@ def _mask(value: ArrayLike) -> NDArray[np.bool_] | None:
         value = ma.asarray(value)
     mask = ma.getmask(value)
     return ma.getmaskarray(value) if np.any(mask) else None
-
-
-def _described(value: object) -> str:
-    return f"{type(value).__name__} {value!r:.60}"

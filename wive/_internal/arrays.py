@@ -162,10 +162,10 @@ class TorchTensors:
 class DLPackArrays(_OnWarpStream):
     """Arrays that support DLPack, such as CuPy's and JAX's; the protocol orders the streams."""
 
-    def __init__(self, namespace: Any) -> None:
-        """`namespace` is the module whose `from_dlpack` makes such arrays."""
-        self.name = str(namespace.__name__).partition(".")[0]
-        self.namespace = namespace
+    def __init__(self, name: str, namespace: Any) -> None:
+        """`namespace` is the module whose `from_dlpack` makes such arrays; else results are NumPy's."""
+        self.name = name
+        self.make = getattr(namespace, "from_dlpack", None)
 
     def device(self, array: Any) -> str | None:
         """The device that the protocol names."""
@@ -180,7 +180,7 @@ class DLPackArrays(_OnWarpStream):
 
     def from_numpy(self, array: NDArrayAny) -> Any:
         """An array over the same memory."""
-        return self.namespace.from_dlpack(array)
+        return array if self.make is None else self.make(array)
 
     def to_warp(self, array: Any, device: str) -> Any:
         """An array over the same memory."""
@@ -189,8 +189,8 @@ class DLPackArrays(_OnWarpStream):
         return wp.from_dlpack(array)
 
     def from_warp(self, array: Any) -> Any:
-        """An array over the same memory."""
-        return self.namespace.from_dlpack(array)
+        """An array over the same memory; NumPy's are a copy, unless the device is the host."""
+        return array.numpy() if self.make is None else self.make(array)
 
 
 class CudaInterfaceArrays(_OnWarpStream):
@@ -254,7 +254,7 @@ def library_of(value: Any) -> Library:
     if torch is not None and isinstance(value, torch.Tensor):
         return TORCH
     if hasattr(value, "__dlpack__"):
-        return DLPackArrays(_namespace(value))
+        return _dlpack_library(value)
     if hasattr(value, "__cuda_array_interface__"):
         return CUDA_INTERFACE
     return NUMPY
@@ -265,23 +265,13 @@ def lies_on(place: str | None, device: str) -> bool:
     return device != "cpu" if place is None else place == device
 
 
-def host_array(name: str, value: Any) -> Any:
-    """`value` as an array that NumPy can read; ValueError if it is not in host memory."""
-    library = library_of(value)
-    place = library.device(value) or "a CUDA device"
-    if place != "cpu":
-        raise ValueError(
-            f"{name} must be in host memory, where trees are built, got an array on {place}: "
-            "copy it to the host"
-        )
-    return library.to_numpy(value)
-
-
-def _namespace(value: Any) -> Any:
-    """The module of the array API that made `value`, or the package that its type comes from."""
-    if hasattr(value, "__array_namespace__"):
-        return value.__array_namespace__()
-    return sys.modules[type(value).__module__.partition(".")[0]]
+def _dlpack_library(value: Any) -> Library:
+    """By the module of the array API that made `value`, or the package that its type comes from."""
+    package = type(value).__module__.partition(".")[0]
+    if not hasattr(value, "__array_namespace__"):
+        return DLPackArrays(package, sys.modules.get(package))
+    namespace = value.__array_namespace__()
+    return DLPackArrays(str(namespace.__name__).partition(".")[0], namespace)
 
 
 def _rows(array: Any) -> Any:

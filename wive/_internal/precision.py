@@ -5,6 +5,8 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
+from wive._internal.room import expect_room
+
 Precision = Literal["float32", "float64"]
 Floats = NDArray[np.float32 | np.float64]
 
@@ -28,6 +30,7 @@ class Real:
         """The values in this dtype, rounded, C-contiguous; not copied if they are so already."""
         if values.dtype is self.dtype and values.flags.c_contiguous and values.flags.aligned:
             return values
+        expect_room(values.size, self.dtype)
         with np.errstate(over="ignore"):
             return np.require(values, self.dtype, ["C", "A"])
 

@@ -9,7 +9,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from wive._internal import arguments
-from wive._internal.arrays import NUMPY, NUMPY_TYPES, Library, WarpArrays, library_of, lies_on
+from wive._internal.arrays import (
+    NUMPY,
+    NUMPY_TYPES,
+    Library,
+    WarpArrays,
+    library_of,
+    lies_on,
+)
+from wive._internal.host_arrays import place_of, to_numpy
 from wive._internal.precision import FLOAT32, Floats, Real
 
 NAMES = ("origins", "directions", "tmin", "tmax")
@@ -38,8 +46,8 @@ class Rays(NamedTuple):
         return np.asarray(origins).dtype == np.asarray(directions).dtype == dtype
 
     def _on_host(self) -> tuple[Any, Any, Any, Any]:
-        given = zip(self.libraries, self[:4], strict=True)
-        origins, directions, tmin, tmax = (library.to_numpy(value) for library, value in given)
+        given = zip(NAMES, self.libraries, self[:4], strict=True)
+        origins, directions, tmin, tmax = (to_numpy(*one) for one in given)
         return origins, directions, tmin, tmax
 
 
@@ -81,7 +89,7 @@ def check_rays(
                 "convert one of them"
             )
     for name, value, other in foreign:
-        _check_place(name, other.device(value), backend, device)
+        _check_place(name, place_of(name, other, value), backend, device)
     return Rays(*values, _answering(libraries, library), libraries)
 
 

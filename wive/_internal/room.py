@@ -1,0 +1,16 @@
+"""Whether arrays that are about to be made fit into memory, which systems grant and then kill for."""
+
+from typing import Any
+
+import numpy as np
+
+from wive import _cpu
+
+# Smaller arrays are not worth a call.
+UNCHECKED_NUMBERS = 1 << 23
+
+
+def expect_room(count: int, dtype: np.dtype[Any] | type[np.generic]) -> None:
+    """Raise MemoryError if there is no memory for an array of `count` numbers."""
+    if count > UNCHECKED_NUMBERS:
+        _cpu.expect_memory(count * np.dtype(dtype).itemsize)
