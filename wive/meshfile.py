@@ -15,6 +15,7 @@ from wive._internal.formats import Mesh
 from wive._internal.formats.kinds import kind_of
 from wive._internal.npzfile import check_input
 from wive._internal.precision import FLOAT32, Floats, Real, real_named
+from wive._internal.storage import refuse_saved_scene
 
 # Readers of formats that may be text.
 TEXT = ("obj", "off", "ply", "stl")
@@ -57,6 +58,7 @@ def load_mesh(
     kind = kind_of(data, name, file_type)
     if not data:
         raise ValueError(f"{name}: is empty")
+    refuse_saved_scene(name, data)
     return _checked(_read(kind, data, name, folder, real), name, real)
 
 

@@ -12,11 +12,11 @@ from wive import _cpu
 from wive._internal import arguments
 from wive._internal.arguments import USUAL_WORK, LanesOption, Work
 from wive._internal.cpu_tracer import CpuTracer
-from wive._internal.files import PathLike
+from wive._internal.files import PathLike, file_name
 from wive._internal.host_arrays import host_array
 from wive._internal.precision import FLOAT64, Floats, Precision, real_of
 from wive._internal.rays import Rays, check_rays
-from wive._internal.storage import Options, read_scene, write_scene
+from wive._internal.storage import FORMAT_VERSION, Options, read_scene, refuse_newer, write_scene
 from wive._internal.tracer import Tracer
 from wive.all_hits import AllHits
 from wive.backend import resolve_backend
@@ -344,7 +344,7 @@ class Scene:
 
     def __reduce__(self) -> tuple[Callable[..., Scene], tuple[Any, ...]]:
         """Pickle the mesh and the options; unpickling builds the tree again."""
-        return _rebuild, (self.vertices, self._faces, self._options)
+        return _rebuild, (self.vertices, self._faces, self._options, FORMAT_VERSION)
 
     @property
     def _bvh(self) -> _cpu.Bvh:
@@ -393,10 +393,12 @@ def load(path: PathLike, *, backend: str | None = None, device: str | None = Non
     if backend is not None or device is not None:
         options["backend"], options["device"] = backend or "auto", device
     try:
-        return _rebuild(vertices, faces, options)
+        return Scene(vertices, faces, **options)
     except (TypeError, ValueError) as error:
-        raise ValueError(f"{path}: {error}") from error
+        raise ValueError(f"{file_name(path)}: {error}") from error
 
 
-def _rebuild(vertices: Floats, faces: NDArray[np.int32], options: Options) -> Scene:
+def _rebuild(vertices: Floats, faces: NDArray[np.int32], options: Options, version: int = 1) -> Scene:
+    """The scene of a pickle; pickles that name no version are of the first."""
+    refuse_newer("pickled scene", version, options)
     return Scene(vertices, faces, **options)

@@ -74,7 +74,7 @@ def header(**changes) -> np.ndarray:
         ({"header": np.array("hello")}, "not a scene saved by wive"),
         ({"header": header(format="other")}, "not a scene saved by wive"),
         ({"header": header(options={})}, "not a scene saved by wive"),
-        ({"header": header(version=2)}, "scene file of version 2, this wive reads version 1"),
+        ({"header": header(version=2)}, "scene file of version 2, written by a newer wive"),
         ({"header": header(), "vertices": VERTICES[:2]}, "faces must index the 2 vertices from 0"),
     ],
 )

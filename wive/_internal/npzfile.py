@@ -14,7 +14,7 @@ from numpy.lib import format as npy
 from numpy.typing import NDArray
 
 from wive._internal.archives import Archive
-from wive._internal.files import PathLike
+from wive._internal.files import PathLike, file_name
 from wive._internal.lines import one_line
 
 # A header is some 100 bytes; NumPy refuses one over 10,000 of its own accord.
@@ -87,7 +87,7 @@ def open_npy_or_npz(path: PathLike, expected: str) -> Iterator[NDArray[Any] | Np
 
 def check_input(path: PathLike) -> str:
     """Raise OSError unless `path` is a file that can be read; return it as text."""
-    name = os.fspath(path)
+    name = file_name(path)
     if not os.path.exists(name):
         raise FileNotFoundError(f"{name}: no such file")
     if not os.path.isfile(name):

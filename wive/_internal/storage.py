@@ -1,12 +1,13 @@
 """A scene as one file: its mesh and its options. Loading builds the tree again, bit for bit the same."""
 
-from typing import Literal, TypedDict
+import io
+from typing import Any, Literal, TypedDict
 
 import numpy as np
 from numpy.typing import NDArray
 
-from wive._internal.files import PathLike, atomic_write
-from wive._internal.npzfile import open_npz
+from wive._internal.files import PathLike, atomic_write, file_name
+from wive._internal.npzfile import Npz, open_npz
 from wive._internal.precision import Floats
 
 FORMAT = "wive scene"
@@ -23,6 +24,13 @@ class Options(TypedDict):
     quality: Literal["medium", "high"]
 
 
+# What else a file or a pickle may hold is a newer wive's.
+OPTIONS = frozenset(Options.__annotations__)
+# The arrays of a saved scene's file.
+HEADER, MESH = "header", ("vertices", "faces")
+ZIP = b"PK\x03\x04"
+
+
 def write_scene(path: PathLike, vertices: Floats, faces: NDArray[np.int32], options: Options) -> None:
     """Write the file, in NumPy's npz format, vertices in their dtype, which is the scene's precision.
 
@@ -30,7 +38,11 @@ def write_scene(path: PathLike, vertices: Floats, faces: NDArray[np.int32], opti
     """
     import json
 
-    header = json.dumps({"format": FORMAT, "version": FORMAT_VERSION, "options": options})
+    import wive
+
+    header = json.dumps(
+        {"format": FORMAT, "version": FORMAT_VERSION, "wive": wive.__version__, "options": options}
+    )
     with atomic_write(path) as file:
         np.savez(file, header=np.array(header), vertices=vertices, faces=faces)
 
@@ -40,27 +52,74 @@ def read_scene(path: PathLike) -> tuple[Floats, NDArray[np.int32], Options]:
 
     Raises OSError if the file can't be read, ValueError if it is no scene or of a newer version.
     """
+    name = file_name(path)
+    no_scene = f"{name}: not a scene saved by wive"
+    with open_npz(name, "a scene saved by wive") as found:
+        header = _header(found[HEADER]) if HEADER in found else None
+        if header is None:
+            raise ValueError(no_scene)
+        _refuse_newer_file(name, header)
+        given: Any = header.get("options")
+        try:
+            options = Options(
+                backend=given["backend"],
+                device=given.get("device"),
+                accuracy=given["accuracy"],
+                nodes=given["nodes"],
+                quality=given.get("quality", "medium"),
+            )
+            vertices, faces = (found[name] for name in MESH)
+        except (KeyError, TypeError):  # options that are no dict are a TypeError
+            raise ValueError(no_scene) from None
+    return vertices, faces, options
+
+
+def refuse_newer(what: str, version: int, options: object, writer: object = None) -> None:
+    """Raise ValueError if `what` is of a version, or has options, that only a newer wive knows.
+
+    writer: the version of wive that wrote it, if that is known.
+    """
+    import wive
+
+    unknown = ", ".join(sorted(map(str, options.keys() - OPTIONS))) if isinstance(options, dict) else ""
+    if version <= FORMAT_VERSION and not unknown:
+        return
+    found = f"of version {version}" if version > FORMAT_VERSION else f"with unknown options ({unknown})"
+    by = f"wive {writer}" if isinstance(writer, str) else "a newer wive"
+    raise ValueError(
+        f"{what} {found}, written by {by}; this is wive {wive.__version__}, "
+        f"which reads version {FORMAT_VERSION}: upgrade wive, or save the scene again with this one"
+    )
+
+
+def refuse_saved_scene(name: str, data: bytes) -> None:
+    """Raise ValueError if the content of a file is a saved scene, where a mesh is expected."""
+    if not data.startswith(ZIP):
+        return
+    try:
+        header = _header(Npz(io.BytesIO(data), name, "a scene saved by wive")[HEADER])
+    except (KeyError, ValueError):  # another archive, or damaged: the reader of meshes says so
+        return
+    if header is not None:
+        _refuse_newer_file(name, header)
+        raise ValueError(
+            f"{name}: is a scene that Scene.save wrote and no mesh: open it with wive.load(path)"
+        )
+
+
+def _header(array: NDArray[Any]) -> dict[str, Any] | None:
+    """The header of a saved scene, with a version; None if it is none."""
     import json
 
-    with open_npz(path, "a scene saved by wive") as found:
-        if not {"header", "vertices", "faces"} <= found.keys():
-            raise ValueError(f"{path}: not a scene saved by wive")
-        arrays = {name: found[name] for name in ("header", "vertices", "faces")}
     try:
-        header = json.loads(str(arrays["header"]))
-        is_scene, version = header["format"] == FORMAT, header["version"]
-        given = header["options"]
-        options = Options(
-            backend=given["backend"],
-            device=given.get("device"),
-            accuracy=given["accuracy"],
-            nodes=given["nodes"],
-            quality=given.get("quality", "medium"),
-        )
-    except (ValueError, TypeError, KeyError, AttributeError, RecursionError):
-        is_scene = False
-    if not is_scene:
-        raise ValueError(f"{path}: not a scene saved by wive")
-    if version != FORMAT_VERSION:
-        raise ValueError(f"{path}: scene file of version {version}, this wive reads version {FORMAT_VERSION}")
-    return arrays["vertices"], arrays["faces"], options
+        header = json.loads(str(array))
+    except (ValueError, RecursionError):
+        return None
+    if not isinstance(header, dict) or header.get("format") != FORMAT:
+        return None
+    version = header.get("version")
+    return header if type(version) is int and version >= 1 else None
+
+
+def _refuse_newer_file(name: str, header: dict[str, Any]) -> None:
+    refuse_newer(f"{name}: scene file", header["version"], header.get("options"), header.get("wive"))
