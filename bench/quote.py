@@ -27,7 +27,7 @@ def main(options: Sequence[str]) -> None:
     parser.add_argument("--results", type=Path, default=report.RESULTS, help="the folder of JSON files")
     chosen = parser.parse_args(options)
     text = chosen.document.read_text()
-    chosen.document.write_text(quoted(text, chosen.results))
+    report.write_text(chosen.document, quoted(text, chosen.results))
     for name in sorted({match[2] for match in QUOTE.finditer(text)}):
         bench = name.split(".")[0]
         if not (chosen.results / f"{bench}.json").exists():

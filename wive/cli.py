@@ -105,6 +105,13 @@ def _add_trace(subparsers: "argparse._SubParsersAction[_Parser]") -> None:
     )
     parser.add_argument("-o", "--output", required=True, metavar="NPZ", help="hits to write")
     parser.add_argument("--all", action="store_true", help="every hit of each ray; also writes offsets")
+    parser.add_argument(
+        "--max-bytes",
+        type=int,
+        metavar="BYTES",
+        help=f"with --all: what the hits of {commands.BATCH_RAYS:,} rays may take; "
+        "default: three quarters of the memory that is available",
+    )
     _add_scene_options(parser)
     _add_precision(parser)
     parser.set_defaults(run=commands.trace_rays)

@@ -88,10 +88,13 @@ def cut(path: Path, folder: Path) -> list[str]:
 
 def copy_scenes(source: SceneFolder, folder: Path) -> None:
     """Writes the scenes of the bench, those that are here, and their cameras."""
+    names = source.select((), SCENES).names
+    if any(folder in path.resolve().parents for path in source.files()):
+        raise BenchError(f"{folder} holds the scenes to copy, which would be lost: choose another folder")
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir()
     cameras = {}
-    for name in source.select((), SCENES).names:
+    for name in names:
         mesh = source.load(name)
         np.savez_compressed(folder / f"{name}.npz", vertices=mesh.vertices, faces=mesh.faces)
         cameras[name] = {key: getattr(mesh.camera, key) for key in ("eye", "target", "up", "fov")}

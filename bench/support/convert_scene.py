@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.contenders.compiled_shim import BenchError
+from wive._internal.files import atomic_write, check_output
 
 
 def main(options: Sequence[str]) -> None:
@@ -28,8 +29,13 @@ def main(options: Sequence[str]) -> None:
     chosen = parser.parse_args(options)
     if chosen.out.suffix != ".npz":
         raise BenchError(f"expected a file NAME.npz to write, got {chosen.out}")
+    try:
+        check_output(chosen.out, inputs=chosen.sources)
+    except (OSError, ValueError) as problem:
+        raise BenchError(str(problem)) from None
     vertices, faces = merged([part for source in chosen.sources for part in parts(source)])
-    np.savez_compressed(chosen.out, vertices=vertices, faces=faces)
+    with atomic_write(chosen.out) as file:
+        np.savez_compressed(file, vertices=vertices, faces=faces)
     print(f"wrote {chosen.out}: {len(vertices):,} vertices, {len(faces):,} triangles")
     print(f"For cameras.json beside it: {json.dumps({chosen.out.stem: outside_camera(vertices)})}")
 

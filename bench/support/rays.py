@@ -1,7 +1,6 @@
 """The rays that benches trace: recorded once per mesh, so that every side and run traces the same arrays."""
 
 import hashlib
-import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,6 +10,7 @@ from numpy.typing import NDArray
 
 from bench.contenders.compiled_shim import cache_folder
 from bench.support.scenes import Camera, Mesh
+from wive._internal.files import atomic_write
 
 GENERATOR_VERSION = 1  # part of the cache's key: raise it if the rays change
 
@@ -139,9 +139,8 @@ def recorded_rays(mesh: Mesh, trace: Tracer | None = None) -> dict[str, Rays]:
             for kind, rays in sets.items()
             for name, array in zip(("origins", "directions", "tmin", "tmax"), rays.arrays, strict=True)
         }
-        draft = path.with_suffix(f".{os.getpid()}.npz")
-        np.savez(draft, **arrays)  # type: ignore[arg-type]
-        draft.replace(path)
+        with atomic_write(path) as file:
+            np.savez(file, **arrays)  # type: ignore[arg-type]
     with np.load(path) as stored:
         return {
             kind: Rays(

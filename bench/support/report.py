@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from bench.contenders.compiled_shim import BenchError, cache_folder, compiler_version, embreex_version
+from wive._internal.files import atomic_write
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -79,7 +80,8 @@ def save(name: str, content: Row, figure: "Figure | None", folder: Path | None, 
     write(path, {"bench": name, "environment": environment(), **content})
     print(f"\nwrote {path}")
     if figure is not None:
-        figure.savefig(path.with_suffix(".png"), dpi=130)
+        with atomic_write(path.with_suffix(".png")) as file:
+            figure.savefig(file, format="png", dpi=130)
         print(f"wrote {path.with_suffix('.png')}")
     return path
 
@@ -92,7 +94,13 @@ def partial_folder() -> Path:
 def write(path: Path, content: Row) -> None:
     """Writes the content as JSON; creates the folder if there is none."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(to_json(content))
+    write_text(path, to_json(content))
+
+
+def write_text(path: Path, text: str) -> None:
+    """Writes a file of text, whole or not at all."""
+    with atomic_write(path) as file:
+        file.write(text.encode())
 
 
 def to_json(content: Row) -> str:

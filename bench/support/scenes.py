@@ -95,6 +95,10 @@ class SceneFolder:
                         self._files[name] = candidate / f"{name}.npz"
                         self._cameras[name] = Camera(**camera)
 
+    def files(self) -> list[Path]:
+        """The files of the scenes."""
+        return list(self._files.values())
+
     def names(self) -> list[str]:
         """Every scene that is here, those of the docs first."""
         return [name for name in dict.fromkeys((*SCENES, *self._cameras)) if name in self._cameras]

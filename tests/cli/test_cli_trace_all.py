@@ -26,3 +26,20 @@ def test_trace_all_writes_the_hits_of_the_library(tmp_path, capsys, monkeypatch,
         for name in hits:
             np.testing.assert_array_equal(hits[name], getattr(expected, name))
             assert hits[name].dtype == getattr(expected, name).dtype
+
+
+def test_all_hits_have_a_limit(tmp_path, capsys):
+    vertices, faces = soup(200, seed=1)
+    np.savez(tmp_path / "soup.npz", vertices=vertices, faces=faces)
+    np.save(tmp_path / "rays.npy", np.column_stack(random_rays(100, seed=2, low=0, high=1)))
+    files = [str(tmp_path / name) for name in ("soup.npz", "rays.npy", "hits.npz")]
+    command = ["trace", *files[:2], "-o", files[2]]
+    assert main([*command, "--all", "--max-bytes", "100"]) == 2
+    error = capsys.readouterr().err
+    assert "more than the limit of 100 bytes: pass fewer rays" in error
+    assert main([*command, "--max-bytes", "100"]) == 2
+    assert (
+        capsys.readouterr().err == "wive: error: max_bytes is only for all hits: add --all, or leave it out\n"
+    )
+    assert not (tmp_path / "hits.npz").exists()
+    assert main([*command, "--all", "--max-bytes", "1000000"]) == 0

@@ -1,8 +1,10 @@
 """The commands of the command line, given their parsed options."""
 
+import os
 import time
 from argparse import Namespace
-from dataclasses import fields
+from dataclasses import fields, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -11,11 +13,13 @@ from numpy.typing import NDArray
 from wive._internal.arguments import rays as checked_rays
 from wive._internal.arguments import refuse_lacking
 from wive._internal.files import atomic_write, check_output
+from wive._internal.npz_writer import write_npz
 from wive._internal.npzfile import Npz, check_input, open_npy_or_npz
 from wive._internal.picture import Settings
 from wive._internal.precision import Floats, Real, real_named
 from wive._internal.progress import progress_bar
 from wive._internal.terrain import terrain_camera, terrain_mesh
+from wive._internal.textures import names_file
 from wive.all_hits import AllHits
 from wive.backend import Backend, backends
 from wive.camera import Camera
@@ -30,7 +34,12 @@ BATCH_RAYS = 500_000
 
 def render_picture(options: Namespace) -> None:
     """`wive render`: path-trace a mesh, or the terrain, into a PNG."""
-    output = check_png_output(options.output)
+    output = check_png_output(options.output, [options.mesh])
+    if options.mesh and os.path.exists(output) and names_file(check_input(options.mesh), output):
+        raise ValueError(
+            f"output file {output!r} exists and the mesh {options.mesh!r} names it, "
+            "as its texture or another part: choose another name"
+        )
     options.albedo = options.albedo or ("gray" if options.mesh else "normals")
     settings = Settings(**{field.name: getattr(options, field.name) for field in fields(Settings)})
     scene = _scene(options, *(load_mesh(options.mesh) if options.mesh else terrain_mesh()))
@@ -44,13 +53,15 @@ def render_picture(options: Namespace) -> None:
 
 def trace_rays(options: Namespace) -> None:
     """`wive trace`: write the closest hits, or all, of a file of rays to an npz file."""
-    output = check_output(options.output, ".npz")
+    output = check_output(options.output, ".npz", [options.mesh, options.rays])
     check_input(options.rays)
     scene = _scene(options, *load_mesh(options.mesh, options.precision))
     refuse_lacking(scene.backend, scene._tracer.lacks, {"threads": options.threads})
     origins, directions, tmin, tmax = _read_rays(options.rays, real_named(options.precision))
     count = len(origins)
-    query = scene.intersect_all if options.all else scene.intersect
+    if options.max_bytes is not None and not options.all:
+        raise ValueError("max_bytes is only for all hits: add --all, or leave it out")
+    query = partial(scene.intersect_all, max_bytes=options.max_bytes) if options.all else scene.intersect
     found: list[Hits | AllHits] = []
     begin = time.perf_counter()
     with progress_bar(count, "ray", "tracing") as advance:
@@ -66,15 +77,13 @@ def trace_rays(options: Namespace) -> None:
             found.append(hits)
             advance(len(hits))
     seconds = time.perf_counter() - begin
-    arrays: dict[str, Any] = {
-        name: np.concatenate([getattr(hits, name) for hits in found]) for name in ("t", "prim", "uv")
-    }
+    arrays = {name: [getattr(hits, name) for hits in found] for name in ("t", "prim", "uv")}
     if options.all:
         counts = [np.diff(hits.offsets) for hits in found if isinstance(hits, AllHits)]
-        arrays["offsets"] = np.concatenate([[0], np.cumsum(np.concatenate(counts))])
+        arrays["offsets"] = [np.zeros(1, np.int64), np.cumsum(np.concatenate(counts))]
     with atomic_write(output) as file:
-        np.savez(file, **arrays)
-    number = np.count_nonzero(arrays["prim"] >= 0)
+        write_npz(file, arrays)
+    number = sum(np.count_nonzero(prim >= 0) for prim in arrays["prim"])
     print(f"{output}: {_rate(count, seconds)}, {number:,} hits, {_tracer(scene)}")
 
 
@@ -144,12 +153,8 @@ def _camera(options: Namespace, scene: Scene) -> Camera:
         camera = terrain_camera()
     else:
         camera = Camera.framing(scene.bounds, options.up, aspect=options.width / options.height, **fov)
-    return Camera(
-        eye=options.eye or camera.eye,
-        target=options.target or camera.target,
-        up=options.up or camera.up,
-        fov=options.fov or camera.fov,
-    )
+    given = {name: getattr(options, name) for name in ("eye", "target", "up", "fov")}
+    return replace(camera, **{name: value for name, value in given.items() if value is not None})
 
 
 def _read_rays(name: str, real: Real) -> tuple[Floats, ...]:
