@@ -16,6 +16,12 @@ FLATNESS = 0.4
 VIEWPOINT = (0.55, 1.0, 0.6)
 # The fraction of the picture that a framed mesh fills.
 FILLED = 0.94
+# The sine of the smallest angle between the view and `up`.
+SMALLEST_ANGLE = 1e-9
+# The shortest view relative to the coordinates: four units in the last place.
+NEAREST = 2.0**-21
+# Pictures are rendered in float32.
+LARGEST = float(np.finfo(np.float32).max)
 
 
 @dataclass(frozen=True)
@@ -28,7 +34,8 @@ class Camera:
         up: (3,) the direction that is up in the picture; of any length, not along the view.
         fov: vertical field of view in degrees, between 0 and 180.
 
-    Raises ValueError if these leave no picture: eye at the target, up along the view, fov out of range.
+    Raises ValueError if these leave no picture: eye at the target, up along the view, fov out of range, a
+    number that is NaN or beyond float32; TypeError for what is no number.
     """
 
     eye: ArrayLike
@@ -51,21 +58,29 @@ class Camera:
             up: (3,); None is the axis of the smallest extent if the box is clearly flat, else y.
             fov: vertical, in degrees.
             aspect: the picture's width divided by its height.
+
+        Raises ValueError or TypeError that names the argument of no sense.
         """
-        low, high = np.asarray(bounds, np.float64).reshape(2, 3)
-        if not np.isfinite([low, high]).all():
-            raise ValueError("bounds must be finite to be framed: the mesh has no triangle that can be hit")
-        up_vector = _flat_axis(high - low) if up is None else arguments.vector("up", up)
+        low, high = arguments.bounds(bounds, LARGEST)
+        fov, aspect = _field_of_view(fov), arguments.real("aspect", aspect)
+        if aspect <= 0:
+            raise ValueError(f"aspect must be above 0, got {aspect:g}")
+        up_vector = _flat_axis(high - low) if up is None else _direction("up", up)
         right, front = _ground_axes(up_vector)
-        viewpoint = VIEWPOINT @ np.stack([right, front, up_vector / np.linalg.norm(up_vector)])
+        viewpoint = VIEWPOINT @ np.stack([right, front, up_vector])
         centre = (low + high) / 2
-        forward, to_right, to_top = cls(centre + viewpoint, centre, up_vector, fov)._axes()
+        forward, to_right, to_top = cls(viewpoint, np.zeros(3), up_vector, fov)._axes()
 
         corners = np.stack(np.meshgrid(*np.stack([low, high], axis=1), indexing="ij"), axis=-1).reshape(-1, 3)
         tangent = FILLED * math.tan(math.radians(fov) / 2)
+        if not (tangent > 1 / LARGEST and 1 / LARGEST < tangent * aspect < LARGEST):
+            raise ValueError(f"fov and aspect leave no picture, got fov {fov:g} and aspect {aspect:g}")
         across, back_across = _squeeze(corners - centre, forward, to_right, tangent * aspect)
         upward, back_upward = _squeeze(corners - centre, forward, to_top, tangent)
-        back = max(back_across, back_upward) or 1.0
+        # Not so close that eye and target are one in float32.
+        back = max(back_across, back_upward, NEAREST * float(np.max(abs(centre)))) or 1.0
+        if back > LARGEST:
+            raise ValueError(f"fov and aspect must be larger for these bounds, got {fov:g} and {aspect:g}")
         eye = centre + across * to_right + upward * to_top - back * forward
         return cls(eye, eye + back * forward, up_vector, fov)
 
@@ -75,6 +90,7 @@ class Camera:
         They go from the eye to the picture's centre, from there to the middle of the right edge, and to the
         middle of the top edge.
         """
+        width, height = arguments.integer("width", width, 1), arguments.integer("height", height, 1)
         forward, right, top = self._axes()
         tangent = math.tan(math.radians(self.fov) / 2)
         eye = arguments.vector("eye", self.eye)
@@ -82,19 +98,42 @@ class Camera:
 
     def _axes(self) -> NDArray[np.float64]:
         """(3,3) unit vectors: forward, right, top."""
-        fov = arguments.real("fov", self.fov)
-        if not 0 < fov < 180:
-            raise ValueError(f"fov must be between 0 and 180 degrees, got {fov:g}")
-        forward = arguments.vector("target", self.target) - arguments.vector("eye", self.eye)
-        if not forward.any():
+        _field_of_view(self.fov)
+        ends = arguments.vector("eye", self.eye), arguments.vector("target", self.target)
+        for name, end in zip(("eye", "target"), ends, strict=True):
+            if np.max(abs(end)) > LARGEST:
+                raise ValueError(f"{name} must be at most {LARGEST:.3g} in magnitude, got {end.tolist()}")
+        eye, target = ends
+        if (eye == target).all():
             raise ValueError(f"eye and target must differ, got {self.eye!r} for both")
-        forward /= np.linalg.norm(forward)
-        up = arguments.vector("up", self.up)
-        right = np.cross(forward, up)
-        if np.linalg.norm(right) <= 1e-9 * np.linalg.norm(up):
+        forward = _unit(target - eye)
+        right = np.cross(forward, _direction("up", self.up))
+        if np.linalg.norm(right) <= SMALLEST_ANGLE:
             raise ValueError(f"up must not be zero or along the view, got {self.up!r}")
         right /= np.linalg.norm(right)
         return np.stack([forward, right, np.cross(right, forward)])
+
+
+def _field_of_view(fov: float) -> float:
+    degrees = arguments.real("fov", fov)
+    if not 0 < degrees < 180:
+        raise ValueError(f"fov must be between 0 and 180 degrees, got {degrees:g}")
+    return degrees
+
+
+def _direction(name: str, value: ArrayLike) -> NDArray[np.float64]:
+    """A unit vector along `value`."""
+    vector = arguments.vector(name, value)
+    if not vector.any():
+        raise ValueError(f"{name} must not be zero or along the view, got {value!r}")
+    return _unit(vector)
+
+
+def _unit(vector: NDArray[np.float64]) -> NDArray[np.float64]:
+    """A vector's direction; its squares may be beyond float64."""
+    scaled = vector / np.max(abs(vector))
+    unit: NDArray[np.float64] = scaled / np.linalg.norm(scaled)
+    return unit
 
 
 def _squeeze(

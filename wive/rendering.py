@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import io
+from collections.abc import Iterable, Iterator
 from typing import Literal
 
 import numpy as np
 
+from wive import _cpu
 from wive._internal import arguments
 from wive._internal.files import PathLike, atomic_write, check_output
 from wive._internal.picture import Image, Settings
@@ -51,13 +53,19 @@ def render(
     settings = Settings(
         width=width, height=height, spp=spp, bounces=bounces, albedo=albedo, seed=seed, threads=threads
     )
-    return render_counted(scene, camera, settings, progress=progress)[0]
+    return render_counted(scene, camera, settings, progress=arguments.flag("progress", progress))[0]
 
 
 def render_counted(
     scene: Scene, camera: Camera | None, settings: Settings, *, progress: bool
 ) -> tuple[Image, int]:
     """The picture that `render` returns, and how many rays were traced for it."""
+    if not isinstance(scene, Scene):
+        raise TypeError(f"scene must be a wive.Scene, got {type(scene).__name__}")
+    if not (camera is None or isinstance(camera, Camera)):
+        raise TypeError(
+            f"camera must be a wive.Camera, or None to frame the scene, got {type(camera).__name__}"
+        )
     if scene.precision != "float32":
         raise ValueError(
             "scene must be of float32 vertices to be rendered, got float64: "
@@ -67,6 +75,7 @@ def render_counted(
     if camera is None:
         camera = Camera.framing(scene.bounds, aspect=width / height)
     frame = camera.frame(width, height)
+    _cpu.expect_memory(height * width * 3 * np.dtype(np.float32).itemsize)
     image = np.zeros((height, width, 3), np.float32)
     tracer = scene._tracer  # one picture shows one shape, whatever refits happen meanwhile
     arguments.refuse_lacking(tracer.backend, tracer.lacks, {"threads": settings.threads})
@@ -79,9 +88,9 @@ def render_counted(
     return image, rays
 
 
-def check_png_output(path: PathLike) -> str:
-    """Raise unless `write_png` can write to `path`: call it before rendering."""
-    name = check_output(path, ".png")
+def check_png_output(path: PathLike, inputs: Iterable[PathLike | None] = ()) -> str:
+    """Raise unless `write_png` can write to `path`, none of the files `inputs`: call it before rendering."""
+    name = check_output(path, ".png", inputs)
     try:
         import PIL.Image  # noqa: F401
     except ImportError:
@@ -93,11 +102,19 @@ def write_png(path: PathLike, image: Image) -> None:
     """Write linear radiance as an 8-bit sRGB PNG; values above 1 are white. The file is whole or absent."""
     from PIL import Image as pillow
 
-    linear = np.clip(image, 0, 1)
-    # IEC 61966-2-1, the sRGB transfer function.
-    encoded = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
+    levels = np.empty(image.shape, np.uint8)
+    for row, linear in zip(levels, image, strict=True):  # row by row: less memory than the picture takes
+        row[:] = _encoded(np.clip(linear, 0, 1)) * 255 + 0.5
+    # In memory first: Pillow doesn't say why it can't write to a file.
+    content = io.BytesIO()
+    pillow.fromarray(levels).save(content, format="PNG", optimize=True)
     with atomic_write(path) as file:
-        pillow.fromarray((encoded * 255 + 0.5).astype(np.uint8)).save(file, format="PNG", optimize=True)
+        file.write(content.getbuffer())
+
+
+def _encoded(linear: Image) -> Image:
+    """IEC 61966-2-1, the sRGB transfer function."""
+    return np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
 
 
 def _bands(height: int, row_paths: int, device: str | None) -> Iterator[tuple[int, int]]:
