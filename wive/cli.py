@@ -1,6 +1,9 @@
 """The command line: `wive render | trace | info | backends`."""
 
 import argparse
+import contextlib
+import io
+import os
 import sys
 from collections.abc import Sequence
 from typing import NoReturn
@@ -12,16 +15,21 @@ from wive.backend import CPU_BACKENDS, WARP
 
 BAD_INPUT = 2
 INTERRUPTED = 130
+BROKEN_PIPE = 141
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command in `argv` (default: the program's arguments) and return its exit status.
 
-    0 is success, 2 bad input or usage (one line on stderr), 130 Ctrl-C.
+    0 is success, 2 bad input or usage (one line on stderr), 130 Ctrl-C, 141 if nobody reads what it prints.
     """
     try:
         options = _parser().parse_args(argv)
-        options.run(options)
+        with contextlib.redirect_stdout(io.StringIO()) as printed:
+            options.run(options)
+        _print(printed.getvalue())
+    except BrokenPipeError:  # as of `wive info ... | head -1`
+        return BROKEN_PIPE
     except KeyboardInterrupt:
         print("wive: interrupted", file=sys.stderr)
         return INTERRUPTED
@@ -29,6 +37,16 @@ def main(argv: Sequence[str] | None = None) -> int:
         print(f"wive: error: {' '.join(str(error).split()) or 'out of memory'}", file=sys.stderr)
         return BAD_INPUT
     return 0
+
+
+def _print(text: str) -> None:
+    """Print a command's text; OSError that names standard output if it can't be."""
+    try:
+        print(text, end="", flush=True)
+    except OSError as error:
+        # Python would write it once more at its end, and complain.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        raise OSError(error.errno, error.strerror, "standard output") from error
 
 
 class _Parser(argparse.ArgumentParser):

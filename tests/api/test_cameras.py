@@ -33,6 +33,7 @@ NO_NUMBERS = [
     (b"40", TypeError),
     (None, TypeError),
     (1j, TypeError),
+    (True, TypeError),
     (np.complex64(1), TypeError),
     ([40], TypeError),
     (np.array([40.0]), TypeError),

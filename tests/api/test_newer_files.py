@@ -35,15 +35,19 @@ NEWER = [
 
 @pytest.mark.parametrize("content", NEWER)
 @pytest.mark.parametrize("arrays", [MESH, {}, {"tree": [1]}])
-def test_a_file_of_a_newer_version_says_so(tmp_path, content, arrays):
+def test_a_file_of_a_newer_version_says_so(tmp_path, capsys, content, arrays):
     path = tmp_path / "scene"
     write(path, content, **arrays)
-    with pytest.raises(ValueError) as error:
-        wive.load(path)
-    assert str(error.value) == (
+    expected = (
         f"{path}: scene file of version {content['version']}, written by a newer wive; this is wive "
         f"{wive.__version__}, which reads version 1: upgrade wive, or save the scene again with this one"
     )
+    for read in (wive.load, wive.load_mesh, wive.Scene.from_file):
+        with pytest.raises(ValueError) as error:
+            read(path)
+        assert str(error.value) == expected
+    assert main(["info", str(path)]) == 2
+    assert capsys.readouterr().err == f"wive: error: {expected}\n"
 
 
 def test_the_writer_is_named_if_the_file_names_it(tmp_path):
@@ -120,3 +124,10 @@ def test_a_saved_scene_where_a_mesh_is_expected_names_load(tmp_path, capsys, nam
         printed = capsys.readouterr().err
         assert "wive.load" in printed
         assert printed.count("\n") == 1
+
+
+def test_a_mesh_with_a_header_of_its_own_is_a_mesh(tmp_path):
+    for number, content in enumerate(([1, 2], "text", json.dumps({"format": "other"}))):
+        path = tmp_path / f"mesh{number}.npz"
+        np.savez(path, header=np.array(content), **MESH)
+        assert len(wive.load_mesh(path)[1]) == 1

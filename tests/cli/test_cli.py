@@ -280,6 +280,25 @@ def test_the_program_succeeds_and_fails_by_exit_status(tmp_path):
     assert bad.returncode == 2
 
 
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="there is no /dev/full")
+def test_output_that_can_not_be_printed_is_an_error(ball):
+    with open("/dev/full", "wb") as full:
+        command = [sys.executable, "-m", "wive", "info", str(ball)]
+        ran = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True, cwd=ELSEWHERE)
+    assert ran.stderr == "wive: error: [Errno 28] No space left on device: 'standard output'\n"
+    assert ran.returncode == 2
+
+
+def test_a_reader_that_leaves_ends_the_program_silently(ball):
+    reading, writing = os.pipe()
+    os.close(reading)
+    command = [sys.executable, "-m", "wive", "info", str(ball)]
+    ran = subprocess.run(command, stdout=writing, stderr=subprocess.PIPE, text=True, cwd=ELSEWHERE)
+    os.close(writing)
+    assert ran.stderr == ""
+    assert ran.returncode == 141
+
+
 def test_ctrl_c_ends_a_long_render_with_130_and_no_file(ball, tmp_path):
     process = program(
         "render",

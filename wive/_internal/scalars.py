@@ -7,6 +7,9 @@ import numpy as np
 
 MOST_COUNT = 2**31 - 1  # the core takes 32-bit counts
 
+# What float() takes and is no real number.
+NOT_REAL = str, bytes, bytearray, bool, np.bool_, np.complexfloating
+
 
 def choice(name: str, value: object, allowed: Iterable[str]) -> None:
     """Raise ValueError unless `value` is one of the allowed names."""
@@ -40,8 +43,8 @@ def flag(name: str, value: object) -> bool:
 def real(name: str, value: object) -> float:
     """`value` as a finite float."""
     try:
-        # float(value) also takes strings and, with a warning, complex numbers and arrays.
-        if isinstance(value, (str, bytes, bytearray, np.complexfloating)) or np.ndim(value) > 0:  # type: ignore[arg-type]
+        # float() also takes arrays of one number, with a warning.
+        if isinstance(value, NOT_REAL) or np.ndim(value) > 0:  # type: ignore[arg-type]
             raise TypeError
         number = float(value)  # type: ignore[arg-type]
     except OverflowError:
