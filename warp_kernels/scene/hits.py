@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from wive._internal.spawn import ACCURACIES
 from wive.all_hits import row_of
 from wive.warp_kernels.lanes.precision import PRECISIONS
+from wive.warp_kernels.scene.memory import memory_errors
 from wive.warp_kernels.scene.rays import WarpRays
 from wive.warp_kernels.scene.spawn import bound_constants, bounds_kernel, spawn_constants, spawn_kernel
 from wive.warp_kernels.scene.surfaces import count_hits, hit_kernels, number_rays
@@ -66,7 +67,8 @@ class WarpHits:
 
     def _computed(self, kernel: Any, dtype: Any, inputs: list[Any]) -> Any:
         """What the kernel writes, one value per hit."""
-        output = wp.empty(len(self.prim), dtype=dtype, device=self.prim.device)
+        with memory_errors():
+            output = wp.empty(len(self.prim), dtype=dtype, device=self.prim.device)
         wp.launch(kernel, len(output), inputs, [output], device=output.device)
         return output
 

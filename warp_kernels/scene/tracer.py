@@ -145,8 +145,15 @@ class WarpTracer:
         """A function that renders rows [begin, end) into `image` and returns how many rays it traced."""
         from wive.warp_kernels.scene.render import PictureRenderer
 
-        renderer: Callable[[int, int], int] = PictureRenderer(self, camera, image, settings).render_rows
-        return renderer
+        with memory_errors():
+            renderer = PictureRenderer(self, camera, image, settings)
+
+        def render_rows(begin: int, end: int) -> int:
+            with memory_errors():
+                rays: int = renderer.render_rows(begin, end)
+            return rays
+
+        return render_rows
 
     def _count(self, rays: WarpRays, work: Work) -> tuple[Any, Any]:
         counts = wp.empty(len(rays), dtype=wp.int32, device=self.device)
