@@ -363,7 +363,8 @@ class Scene:
         """Check a query's arguments; its answer, with the counters if `stats`."""
         tracer = self._tracer
         checked = check_rays(*rays, tracer.backend, tracer.device)
-        if threads is None and in_flight is None and lanes == "auto" and stats is False and max_bytes is None:
+        usual = threads is None and in_flight is None and stats is False and max_bytes is None
+        if usual and type(lanes) is str and lanes == "auto":
             work = USUAL_WORK
         else:
             work = arguments.work(tracer.backend, tracer.lacks, threads, in_flight, lanes, stats, max_bytes)

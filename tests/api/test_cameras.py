@@ -214,3 +214,5 @@ def test_query_options_that_are_no_flags_are_refused():
     scene = wive.Scene(*TRIANGLE)
     for value in ("no", 1, None, np.zeros(2)):
         refused(TypeError, "stats", lambda value=value: scene.intersect([0, 0, 1], [0, 0, -1], stats=value))
+    for value in (np.zeros(2), [8], {}, None, 8.0, True, "8"):
+        refused(ValueError, "lanes", lambda value=value: scene.intersect([0, 0, 1], [0, 0, -1], lanes=value))

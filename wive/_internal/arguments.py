@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from wive._internal.precision import FLOAT32, Floats, Real, real_of
 from wive._internal.room import expect_room
-from wive._internal.scalars import MOST_COUNT, unreadable
+from wive._internal.scalars import MOST_COUNT, shown, unreadable
 from wive._internal.scalars import choice as choice
 from wive._internal.scalars import flag as flag
 from wive._internal.scalars import integer as integer
@@ -208,7 +208,7 @@ def work(
     max_bytes: int | None = None,
 ) -> Work:
     """The options of a query, checked; ValueError for one that the backend lacks."""
-    chosen = None if asked_lanes == "auto" else lanes(asked_lanes)
+    chosen = lanes(asked_lanes)
     limit = 0 if max_bytes is None else integer("max_bytes", max_bytes, 1, MOST_BYTES)
     flags = flag("stats", stats), chosen, limit
     checked = _work((threads(asked_threads), in_flight(asked_in_flight), *flags))
@@ -229,8 +229,12 @@ def refuse_lacking(backend: str, lacks: Iterable[str], given: Mapping[str, objec
 
 def lanes(value: object) -> Lanes | None:
     """8 or 1 lanes of a node per thread; None is "auto"."""
-    if value not in ("auto", 8, 1) or isinstance(value, bool):
-        raise ValueError(f"lanes must be one of auto, 8, 1, got {value!r}")
+    if (
+        not isinstance(value, (str, int, np.integer))
+        or isinstance(value, bool)
+        or value not in ("auto", 8, 1)
+    ):
+        raise ValueError(f"lanes must be one of auto, 8, 1, got {shown(value)}")
     if value == "auto":
         return None
     return 8 if value == 8 else 1
