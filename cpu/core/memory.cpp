@@ -122,8 +122,13 @@ bool can_throw() {
     void* volatile memory = std::malloc(enough);  // volatile: compilers leave unused requests out
     if (memory == nullptr) return false;
     std::free(memory);
-    static_cast<void>(std::uncaught_exceptions());
+    prepare_to_throw();
     return true;
+}
+
+void prepare_to_throw() {
+    // volatile: compilers leave out a call whose result is not used. It allocates the thread's record of exceptions.
+    [[maybe_unused]] const volatile int exceptions = std::uncaught_exceptions();
 }
 
 std::string bytes_text(std::size_t bytes) {

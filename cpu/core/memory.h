@@ -32,7 +32,9 @@ void expect_memory(std::size_t bytes);
 bool requests_can_fail();
 
 // A thread that throws for the first time needs some memory for that, and the C library ends the process if there is
-// none: this takes it while there is. False if there is none.
+// none. This takes it while there is.
+void prepare_to_throw();
+// prepare_to_throw() if there is memory for it; false if there is none.
 bool can_throw();
 
 // A number of bytes as people read it: "1.5 GiB".

@@ -45,9 +45,7 @@ void yield_until(const Ready& ready) {
 // the calling thread does the work alone.
 class Threads {
 public:
-    explicit Threads(unsigned count) : count_(count) {
-        static_cast<void>(std::uncaught_exceptions());  // for the calling thread, see can_throw()
-    }
+    explicit Threads(unsigned count) : count_(count) { prepare_to_throw(); }
     Threads(const Threads&) = delete;
     Threads& operator=(const Threads&) = delete;
     ~Threads() {

@@ -233,9 +233,9 @@ if v.dtype == "f4":
     works["render"] = lambda: wive.render(scene, width=128, height=128, spp=4, threads=16)
 answers = {name: set() for name in works}
 for name, work in works.items():
-    for step in range(24):
+    for step in range(14):
         used = int(open("/proc/self/statm").read().split()[0]) * resource.getpagesize()
-        resource.setrlimit(resource.RLIMIT_AS, (used + (step * step << 18), resource.RLIM_INFINITY))
+        resource.setrlimit(resource.RLIMIT_AS, (used + (step * step << 20), resource.RLIM_INFINITY))
         try:
             work()
             answers[name].add("done")
