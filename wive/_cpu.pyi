@@ -38,6 +38,15 @@ def available_memory(root: str = "") -> int:
 
 def expect_memory(bytes: int) -> None:
     """Raise MemoryError unless as many bytes are available; amounts under 64 MiB are not checked."""
+class DefaultFloats:
+    """A `with` block in which this thread rounds to nearest, keeps subnormals and has no traps.
+
+    All functions here compute so; the block is for what NumPy and Warp's CPU device compute.
+    """
+
+    def __init__(self) -> None: ...
+    def __enter__(self) -> None: ...
+    def __exit__(self, *error: object) -> None: ...
 
 class Kernels:
     """The kernels of one name, for the queries of `Bvh`: the first query with this handle looks them up."""

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cassert>
 #include <cstdint>
 #include <limits>
@@ -31,7 +32,7 @@ ProjectedAreaPrefixSum::ProjectedAreaPrefixSum(const BinaryTree& tree, Threads& 
             float sum = 0;
             for (std::size_t ref = first; ref < last; ++ref) {
                 in_chunk_before_[ref] = sum;
-                sum += tree.refs[ref].projected_area();
+                sum += tree.refs[ref].projected_area() * tree.area_scale * tree.area_scale;
             }
             if (last == tree.count && last < first + chunk_size) in_chunk_before_[last] = sum;
             chunks_before_[chunk] = static_cast<double>(sum);
@@ -48,14 +49,15 @@ ProjectedAreaPrefixSum::ProjectedAreaPrefixSum(const BinaryTree& tree, Threads& 
 
 void sort_slots_for_any_hit(const BinaryTree& tree, const ProjectedAreaPrefixSum& areas, Treelet& treelet) {
     const auto count = static_cast<std::size_t>(treelet.count);
-    // Squares of the scores, which sort alike. Lanes without a slot sort last.
-    alignas(16) std::array<float, node_width> score;
-    score.fill(std::numeric_limits<float>::infinity());
+    // The bits of the squares of the scores, which sort alike. Compared as integers they are totally ordered whatever
+    // the areas are, so that the places are a permutation. Lanes without a slot sort last.
+    alignas(16) std::array<std::int32_t, node_width> score;
+    score.fill(std::numeric_limits<std::int32_t>::max());
     for (std::size_t i = 0; i < count; ++i) {
         const Subtree& slot = treelet.slots[i].tree;
-        const float area = tree.box_of(slot).half_area();
+        const float area = tree.box_of(slot).half_area(tree.area_scale);
         const float covered = area > 0 ? static_cast<float>(areas.of(slot)) / area : 0;
-        score[i] = std::min(covered * covered / static_cast<float>(slot.size()), std::numeric_limits<float>::max());
+        score[i] = std::bit_cast<std::int32_t>(covered * covered / static_cast<float>(slot.size()));
     }
     alignas(16) std::array<std::uint32_t, node_width> place{};
     for (std::size_t k = 0; k < node_width; ++k)

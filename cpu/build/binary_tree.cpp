@@ -118,7 +118,7 @@ private:
     SlotCosts build_range(const Range& range, bool from_scratch = false) {
         if (!range.tree.has_node()) {
             move_to_refs(range, from_scratch);
-            return block_costs(range.box);
+            return block_costs(range.box, tree_.area_scale);
         }
         const Halves halves = split_serial(range, from_scratch);
         const SlotCosts left = build_range(halves.left);
@@ -173,7 +173,7 @@ private:
         const BinMap bin_of(range);
         Bins bins(bin_of.count);
         bins.add(from + begin, from + end, bin_of);
-        const Split split = best_split(bins, bin_of);
+        const Split split = best_split(bins, bin_of, tree_.area_scale);
         if (split.axis < 0) return split_by_number(range, move_to_refs(range, from_scratch));
         PrimRef *left = refs + begin, *right = scratch + begin;
         partition(from + begin, from + end, bin_of, split, left, right);
@@ -200,7 +200,7 @@ private:
         });
         Bins bins(bin_of.count);
         for (const Bins& part : parts) bins.add(part, bin_of.count);
-        const Split split = sah_allowed(range) ? best_split(bins, bin_of) : Split{};
+        const Split split = sah_allowed(range) ? best_split(bins, bin_of, tree_.area_scale) : Split{};
         if (split.axis < 0) {
             const Halves halves = split_by_number(range, from);
             std::copy(from + first, from + range.tree.end, to + first);
@@ -255,6 +255,7 @@ BinaryTree build_binary_tree(PrimRefs refs, Threads& threads, int depth_limit, s
     tree.nodes = LargeArray<PrimRef>(refs.count);
     tree.count = refs.count;
     tree.box = refs.box;
+    tree.area_scale = area_scale(refs.box);
     if (tree.count > block_width) TreeBuilder(tree, threads, depth_limit).build(refs.centroids);
     return tree;
 }

@@ -85,6 +85,7 @@ struct BinaryTree {
     std::uint32_t count = 0;
     std::uint32_t largest_leaf = max_leaf_blocks;  // in blocks of four triangles
     Box box;
+    float area_scale = 1;  // for half_area()
 
     Subtree root() const { return {0, count, 0}; }
     BinaryNode node(const Subtree& tree) const {

@@ -112,7 +112,7 @@ struct Bins {
     }
 };
 
-// The split of least SAH cost; of equal ones the lowest axis and bin.
-Split best_split(const Bins& bins, const BinMap& bin_of);
+// The split of least SAH cost; of equal ones the lowest axis and bin. scale: the tree's area_scale.
+Split best_split(const Bins& bins, const BinMap& bin_of, float scale);
 
 }  // namespace wive

@@ -44,6 +44,19 @@ Bvh::Bvh(const Mesh<Real>& mesh, const BuildOptions& options)
     if (doubles && accuracy_ == Accuracy::exact)
         throw std::invalid_argument(
             "accuracy: 'exact' takes vertices in float32, got float64; round them, or use 'watertight'");
+    if constexpr (!doubles)
+        if (form_ == NodeForm::compressed) {
+            // A compressed leaf takes the memory that its vertices need, and they are counted before they are written.
+            const MeshCopy copy(mesh, threads);
+            build(copy.mesh(), options, threads);
+            return;
+        }
+    build(mesh, options, threads);
+}
+
+template <class Real>
+void Bvh::build(const Mesh<Real>& mesh, const BuildOptions& options, Threads& threads) {
+    constexpr bool doubles = precision_of<Real> == Precision::float64;
     check_mesh(mesh, threads);
     if constexpr (doubles) set_bounds(find_bounds(mesh, threads));
     const auto build_binary = [&] {

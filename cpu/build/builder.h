@@ -57,6 +57,8 @@ public:
 
 private:
     Bvh() = default;
+    template <class Real>
+    void build(const Mesh<Real>& mesh, const BuildOptions& options, Threads& threads);
     // Sets the bounds and the centre that follows from them.
     void set_bounds(const Bounds& bounds);
     // Sets bounds (float32) and extent from the box of all triangles. Returns the point to subtract from

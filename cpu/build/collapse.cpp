@@ -1,8 +1,9 @@
 #include "build/collapse.h"
 
 #include <bit>
-#include <cassert>
 #include <limits>
+
+#include "core/ensure.h"
 
 namespace wive {
 namespace {
@@ -24,7 +25,7 @@ SlotSequences add_slots(const BinaryTree& tree, Treelet& treelet, const Subtree&
         }
         leaf = node.decision.as_leaf();
     }
-    assert(treelet.count < node_width);
+    ensure(treelet.count < node_width, "a node of at most 8 children");
     const int slot = treelet.count++;
     treelet.slots[static_cast<std::size_t>(slot)] = {top, leaf};
     count = 1;
@@ -73,7 +74,6 @@ CollapseDecision choose_collapse(std::uint32_t blocks, std::uint32_t largest_lea
 
     const float leaf = half_area * block_cost * static_cast<float>(blocks);
     const float wide = half_area * node_cost + divided.second[3];
-    // The limit is a condition of its own, because both costs are infinite if coordinates are very large.
     const bool as_leaf = blocks <= largest_leaf && leaf <= wide;
     const Float4v one = Float4v{} + (as_leaf ? leaf : wide);
     divided.first[0] = one[0];
@@ -93,8 +93,8 @@ CollapseDecision choose_collapse(std::uint32_t blocks, std::uint32_t largest_lea
 SlotCosts store_node(BinaryTree& tree, const Subtree& top, const Box& box, std::uint32_t split, int axis,
                      const SlotCosts& left, const SlotCosts& right) {
     SlotCosts costs;
-    const CollapseDecision decision =
-        choose_collapse(blocks_for(top.size()), tree.largest_leaf, box.half_area(), left, right, axis, costs);
+    const CollapseDecision decision = choose_collapse(blocks_for(top.size()), tree.largest_leaf,
+                                                      box.half_area(tree.area_scale), left, right, axis, costs);
     tree.nodes[top.place] = std::bit_cast<PrimRef>(
         BinaryNode{{box.lo[0], box.lo[1], box.lo[2]}, split, {box.hi[0], box.hi[1], box.hi[2]}, decision});
     return costs;

@@ -19,9 +19,9 @@ struct SlotCosts {
     bool one_block;         // the subtree is one block: all eight are equal
 };
 
-// Costs of a range small enough for one block: more slots do not lower them.
-inline SlotCosts block_costs(const Box& box) {
-    const Float4v cost = Float4v{} + box.half_area() * block_cost;
+// Costs of a range small enough for one block: more slots do not lower them. scale: the tree's area_scale.
+inline SlotCosts block_costs(const Box& box, float scale) {
+    const Float4v cost = Float4v{} + box.half_area(scale) * block_cost;
     return {cost, cost, true};
 }
 

@@ -39,7 +39,7 @@ private:
 };
 
 // True if the sequence of every octant has each of the first `count` slots once.
-[[maybe_unused]] bool is_permutation(const SlotSequences& order, int count) {
+bool is_permutation(const SlotSequences& order, int count) {
     return std::all_of(order.begin(), order.end(), [&](std::uint32_t sequence) {
         unsigned slots = 0;
         for (int i = 0; i < count; ++i) slots |= 1u << (sequence >> order_bits * i & 7u);
@@ -68,7 +68,7 @@ public:
         Size top = {1, 0};
         plan_top(root, 1, top, subtrees);
         parallel_for(subtrees.size(), threads, [&](std::size_t i) { subtrees[i].size = size_of(subtrees[i].slot); });
-        Size total = top;
+        Size& total = total_ = top;
         for (Part& subtree : subtrees) {
             subtree.first = total;
             total.nodes += subtree.size.nodes;
@@ -158,7 +158,7 @@ private:
     void emit_top(const Treelet& treelet, std::size_t place, std::size_t& next_node, const Part*& next_subtree) {
         std::size_t child_node = next_node;
         next_node += inner_count(treelet);
-        Children children{};
+        Children children;
         for (int i = 0; i < treelet.count; ++i) {
             const Slot& slot = treelet.slots[static_cast<std::size_t>(i)];
             std::uint32_t& child = children[static_cast<std::size_t>(i)];
@@ -174,19 +174,19 @@ private:
                 ensure_filled(part, at);
             }
         }
-        write_node(nodes_[place], treelet, children);
+        write_node(place, treelet, children);
     }
 
     // Emits a subtree from `cursor` on. Returns its depth in nodes.
     int emit_subtree(const Slot& slot, std::size_t place, Size& cursor) {
         const Treelet treelet = treelet_of(slot);
-        Children children{};
+        Children children;
         std::size_t child_node = cursor.nodes;
         for (int i = 0; i < treelet.count; ++i) {
             const Slot& child = treelet.slots[static_cast<std::size_t>(i)];
             children[static_cast<std::size_t>(i)] = child.leaf ? write_leaf(child, cursor) : node_child(cursor.nodes++);
         }
-        write_node(nodes_[place], treelet, children);
+        write_node(place, treelet, children);
         int deepest = 0;
         for (int i = 0; i < treelet.count; ++i) {
             const Slot& child = treelet.slots[static_cast<std::size_t>(i)];
@@ -195,23 +195,27 @@ private:
         return deepest + 1;
     }
 
-    void write_node(StoredNode& out, const Treelet& treelet, const Children& children) const {
+    void write_node(std::size_t place, const Treelet& treelet, const Children& children) const {
+        ensure(place < total_.nodes, "as many nodes as planned");
         Node node;
         for (int i = 0; i < node_width; ++i) {
             write_box(node, i,
                       i < treelet.count ? tree_.box_of(treelet.slots[static_cast<std::size_t>(i)].tree) : Box{},
                       center_);
-            node.child[i] = children[static_cast<std::size_t>(i)];
+            node.child[i] = i < treelet.count ? children[static_cast<std::size_t>(i)] : end_of_stack;
         }
-        assert(is_permutation(treelet.order, treelet.count));
+        ensure(is_permutation(treelet.order, treelet.count), "an order row of permutations");
         write_order(node, treelet.order, treelet.count);
-        Writer::write_node(node, treelet.count, out);
+        Writer::write_node(node, treelet.count, nodes_[place]);
     }
 
     std::uint32_t write_leaf(const Slot& slot, Size& cursor) const {
         const LeafPrims prims(tree_, slot.tree);
         const std::size_t first = cursor.leaf_units;
-        const LeafSize size = Writer::write_leaf(mesh_, options_.accuracy, prims.span(), leaves_ + first * unit_bytes);
+        ensure(first <= total_.leaf_units, "as many leaf units as planned");
+        const LeafSize size =
+            Writer::write_leaf(mesh_, options_.accuracy, prims.span(),
+                               {leaves_ + first * unit_bytes, leaves_ + total_.leaf_units * unit_bytes});
         cursor.leaf_units += size.units;
         ensure(size.blocks >= 1 && size.blocks <= max_leaf_blocks, "a leaf of 1 to 8 blocks");
         return leaf_child(first_leaf_unit_ + first, size.blocks);
@@ -223,6 +227,7 @@ private:
     const std::array<float, 3>& center_;
     std::uint32_t subtree_size_ = std::clamp(tree_.count / subtree_count, smallest_subtree, largest_subtree);
     ProjectedAreaPrefixSum areas_;
+    Size total_ = {};
     StoredNode* nodes_ = nullptr;
     std::byte* leaves_ = nullptr;
     std::size_t first_leaf_unit_ = 0;

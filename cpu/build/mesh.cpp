@@ -91,10 +91,11 @@ float projected_area(const double* a, const double* b, const double* c) {
     return static_cast<float>(std::abs(x) + std::abs(y) + std::abs(z));
 }
 
-// A vertex, with zero in lane 3. Reads four floats, except for the last vertex, behind which there may be no memory.
-Float4v load_vertex(const Mesh<float>& mesh, std::int32_t index) {
-    const float* v = mesh.vertices + 3 * static_cast<std::size_t>(index);
-    if (static_cast<std::size_t>(index) + 1 == mesh.vertex_count) return Float4v{v[0], v[1], v[2], 0};
+// A corner, with zero in lane 3. Reads four floats, except for the last vertex, behind which there may be no memory.
+Float4v load_corner(const Mesh<float>& mesh, std::size_t face, int k) {
+    const std::size_t vertex = mesh.vertex(face, k);
+    const float* v = mesh.vertices + 3 * vertex;
+    if (vertex + 1 == mesh.vertex_count) return Float4v{v[0], v[1], v[2], 0};
     Int4v bits;
     std::memcpy(&bits, v, sizeof bits);
     const Int4v xyz = {-1, -1, -1, 0};
@@ -106,13 +107,39 @@ template <class Real>
 std::vector<bool> used_vertices(const Mesh<Real>& mesh) {
     std::vector<bool> used(mesh.vertex_count);
     for (std::size_t i = 0; i < 3 * mesh.face_count; ++i) {
-        const auto index = static_cast<std::uint32_t>(mesh.faces[i]);
+        const auto index = static_cast<std::uint32_t>(__atomic_load_n(mesh.faces + i, __ATOMIC_RELAXED));
         if (index < mesh.vertex_count) used[index] = true;
     }
     return used;
 }
 
+// Whether all coordinates are of at most max_coordinate, and none is NaN.
+bool are_in_range(Float4v a, Float4v b, Float4v c) {
+    const Float4v most = Float4v{} + max_coordinate<float>;
+    const Int4v in_range = (magnitude(a) <= most) & (magnitude(b) <= most) & (magnitude(c) <= most);
+    return (in_range[0] & in_range[1] & in_range[2]) != 0;
+}
+
+bool has_area(Float4v a, Float4v b, Float4v c) {
+    alignas(16) float corners[3][4];
+    std::memcpy(corners[0], &a, sizeof a);
+    std::memcpy(corners[1], &b, sizeof b);
+    std::memcpy(corners[2], &c, sizeof c);
+    return has_area(corners[0], corners[1], corners[2]);
+}
+
 }  // namespace
+
+MeshCopy::MeshCopy(const Mesh<float>& mesh, Threads& threads)
+    : vertices_(3 * mesh.vertex_count), faces_(3 * mesh.face_count) {
+    const auto copy = [&threads](const auto* from, auto& to) {
+        parallel_chunks_scattered(to.size(), 3 * chunk_size, threads, [&](std::size_t begin, std::size_t end) {
+            std::copy(from + begin, from + end, to.data() + begin);
+        });
+    };
+    copy(mesh.vertices, vertices_);
+    copy(mesh.faces, faces_);
+}
 
 template <class Real>
 void check_mesh(const Mesh<Real>& mesh, Threads& threads) {
@@ -171,16 +198,16 @@ std::invalid_argument too_many_triangles(std::size_t count) {
 }
 
 bool box_triangle(const Mesh<float>& mesh, const Point&, std::size_t face, Box& box) {
-    const std::int32_t* corners = mesh.faces + 3 * face;
-    const Float4v a = load_vertex(mesh, corners[0]), b = load_vertex(mesh, corners[1]),
-                  c = load_vertex(mesh, corners[2]);
+    const Float4v a = load_corner(mesh, face, 0), b = load_corner(mesh, face, 1), c = load_corner(mesh, face, 2);
     box = {minimum(minimum(a, b), c), maximum(maximum(a, b), c)};
     box.hi[3] = projected_area(a, b, c);
-    return surely_has_area(a, b, c) || has_area(mesh.corner(face, 0), mesh.corner(face, 1), mesh.corner(face, 2));
+    return are_in_range(a, b, c) && (surely_has_area(a, b, c) || has_area(a, b, c));
 }
 
 bool box_triangle(const Mesh<double>& mesh, const Point& center, std::size_t face, Box& box) {
-    const double *a = mesh.corner(face, 0), *b = mesh.corner(face, 1), *c = mesh.corner(face, 2);
+    double corners[3][3];
+    if (!mesh.load_corners(face, corners)) return false;
+    const auto& [a, b, c] = corners;
     box.lo[3] = 0;
     box.hi[3] = projected_area(a, b, c);
     for (int axis = 0; axis < 3; ++axis) {
@@ -204,9 +231,11 @@ Bounds find_bounds(const Mesh<double>& mesh, Threads& threads) {
     parallel_chunks(mesh.face_count, chunk_size, threads, [&](std::size_t begin, std::size_t end) {
         Bounds part = none;
         for (std::size_t face = begin; face < end; ++face) {
-            const double *a = mesh.corner(face, 0), *b = mesh.corner(face, 1), *c = mesh.corner(face, 2);
+            double corners[3][3];
+            if (!mesh.load_corners(face, corners)) continue;
+            const auto& [a, b, c] = corners;
             if (!surely_has_area(a, b, c) && !has_area(a, b, c)) continue;
-            for (const double* corner : {a, b, c}) grow(part, corner, corner);
+            for (const auto& corner : corners) grow(part, corner, corner);
         }
         parts[begin / chunk_size] = part;
     });

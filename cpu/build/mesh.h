@@ -4,16 +4,21 @@
 #include <array>
 #include <bit>
 #include <cassert>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <stdexcept>
 
 #include "core/box.h"
 #include "core/large_array.h"
+#include "core/layout.h"
 #include "core/parallel.h"
 
 namespace wive {
 
+// The arrays are the caller's, and another thread may write to them while a tree is built or refitted. So an index is
+// read once and then checked, on every use; coordinates are read once, and a triangle that has left the range that
+// check_mesh accepts is treated as one without an area.
 template <class Real>
 struct Mesh {
     const Real* vertices;  // (vertex_count, 3)
@@ -21,13 +26,40 @@ struct Mesh {
     const std::int32_t* faces;  // (face_count, 3)
     std::size_t face_count;
 
-    // Valid for the faces of a mesh that check_mesh has accepted.
-    const Real* corner(std::size_t face, int k) const {
+    // A face's vertex, within the array whatever the face holds now. check_mesh has seen that there is one.
+    std::size_t vertex(std::size_t face, int k) const {
         assert(face < face_count && k >= 0 && k < 3);
-        const auto vertex = static_cast<std::size_t>(faces[3 * face + static_cast<std::size_t>(k)]);
-        assert(vertex < vertex_count);
-        return vertices + 3 * vertex;
+        const auto index = static_cast<std::size_t>(static_cast<std::uint32_t>(
+            __atomic_load_n(faces + 3 * face + static_cast<std::size_t>(k), __ATOMIC_RELAXED)));
+        return index < vertex_count ? index : 0;
     }
+    const Real* corner(std::size_t face, int k) const { return vertices + 3 * vertex(face, k); }
+
+    // Copies a face's corners. False if a coordinate is out of range, or NaN.
+    bool load_corners(std::size_t face, Real (&corners)[3][3]) const {
+        bool in_range = true;
+        for (int k = 0; k < 3; ++k) {
+            const Real* from = corner(face, k);
+            for (int axis = 0; axis < 3; ++axis) {
+                Real x;
+                __atomic_load(from + axis, &x, __ATOMIC_RELAXED);
+                corners[k][axis] = x;
+                in_range &= std::abs(x) <= max_coordinate<Real>;
+            }
+        }
+        return in_range;
+    }
+};
+
+// A mesh of its own, which no other thread changes.
+class MeshCopy {
+public:
+    MeshCopy(const Mesh<float>& mesh, Threads& threads);
+    Mesh<float> mesh() const { return {vertices_.data(), vertices_.size() / 3, faces_.data(), faces_.size() / 3}; }
+
+private:
+    LargeArray<float> vertices_;
+    LargeArray<std::int32_t> faces_;
 };
 
 // A triangle's box, prim and projected area in 32 bytes. Lane 3 of lo holds the prim, lane 3 of hi the projected area.
@@ -56,8 +88,8 @@ std::invalid_argument too_many_triangles(std::size_t count);
 using Point = std::array<float, 3>;
 
 // Sets `box` to a triangle's box, with the projected area in lane 3 of hi. Returns false if the triangle has no area,
-// decided exactly. float32: the box is in the mesh's coordinates, and only planes are relative to the tree's centre.
-// float64: the box itself is relative to the centre.
+// decided exactly, or is out of range. float32: the box is in the mesh's coordinates, and only planes are relative to
+// the tree's centre. float64: the box itself is relative to the centre.
 bool box_triangle(const Mesh<float>& mesh, const Point& center, std::size_t face, Box& box);
 bool box_triangle(const Mesh<double>& mesh, const Point& center, std::size_t face, Box& box);
 

@@ -37,7 +37,7 @@ public:
         std::size_t top = 0;
         for (; top < nodes.size() && nodes.size() - top < task_count; ++top)
             for (const std::uint32_t child : from_.template node<Form>(nodes[top]).child)
-                if (child != unused && is_inner(child)) nodes.push_back(child);
+                if (is_inner(child)) nodes.push_back(child);
         std::vector<std::size_t> counts(nodes.size());
         parallel_for(nodes.size() - top, threads, [&](std::size_t i) { fit_subtree(nodes[top + i], counts[top + i]); });
         for (std::size_t i = top; i-- > 0;)
@@ -50,8 +50,6 @@ public:
     std::size_t triangle_count() const { return triangle_count_; }
 
 private:
-    static constexpr std::uint32_t unused = inner_child(0);  // the root is no node's child
-
     static std::size_t index_of(std::uint32_t child) { return child_offset(child) / sizeof(Node); }
 
     Box box_of(std::uint32_t node) const {
@@ -66,10 +64,10 @@ private:
         Box* boxes = boxes_.data() + node_width * index_of(node);
         for (int lane = 0; lane < node_width; ++lane) {
             const std::uint32_t child = old.child[lane];
-            if (!is_inner(child))
-                boxes[lane] = fit_leaf(child, count);
+            if (child == end_of_stack)
+                boxes[lane] = Box{};
             else
-                boxes[lane] = child == unused ? Box{} : box_of_inner(child);
+                boxes[lane] = is_inner(child) ? box_of_inner(child) : fit_leaf(child, count);
         }
     }
 

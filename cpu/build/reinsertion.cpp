@@ -21,6 +21,12 @@ constexpr int rounds = 3;                    // each gains less than half of wha
 // What a move must save, in multiples of the moved subtree's own area. Smaller savings lower the SAH cost but not the
 // steps of rays, because they make siblings overlap.
 constexpr float least_gain = 1;
+// Bounds on the work of a round, in nodes looked at. If boxes overlap everywhere, as those of long triangles do, each
+// search would visit most of the tree. On the scenes of docs/scenes.md a search takes 35 steps on average and 170 at
+// most: there the bounds change the cost by less than a thousandth. With longer searches among long triangles the cost
+// is not lower.
+constexpr std::uint32_t longest_search = 96;
+constexpr std::size_t steps_per_triangle = 48;
 
 // A node of the tree while it changes. Leaves are the blocks that binning made. Single triangles as leaves take three
 // times as long and leave blocks emptier, for a cost that is a few percent lower on some scenes and higher on others.
@@ -59,7 +65,8 @@ bool are_equal(const Box& a, const Box& b) {
 
 class LinkedTree {
 public:
-    explicit LinkedTree(const BinaryTree& tree) : nodes_(2 * std::size_t{tree.count}) {
+    explicit LinkedTree(const BinaryTree& tree)
+        : nodes_(2 * std::size_t{tree.count}), area_scale_(tree.area_scale), count_(tree.count) {
         root_ = link(tree, tree.root());
         nodes_[root_].parent = none;
     }
@@ -93,35 +100,43 @@ private:
         return place;
     }
 
+    std::size_t most_steps() const { return steps_per_triangle * count_; }
+    float area_of(const Box& box) const { return box.half_area(area_scale_); }
     std::uint32_t sibling(std::uint32_t node) const { return nodes_[nodes_[node].parent].other_child(node); }
 
-    // The target next to which the subtree enlarges the tree least; none if no place gains least_gain.
+    // The target next to which the subtree enlarges the tree least; none if no place gains least_gain. Of the places
+    // that `steps` allow to look at; lowers `steps` by those taken.
     // Meister and Bittner's algorithm 2: walk up from the subtree's parent and search each sibling's subtree on the
     // way. Below a node, at least the moved subtree's own area is added, which bounds the search.
-    Move find_move(std::uint32_t node, std::vector<std::pair<float, std::uint32_t>>& stack) const {
+    Move find_move(std::uint32_t node, std::vector<std::pair<float, std::uint32_t>>& stack,
+                   std::uint32_t& steps) const {
+        stack.clear();
         const Box box = nodes_[node].box;
-        const float area = box.half_area();
+        const float area = area_of(box);
         Move best{least_gain * area, node, none};
         std::uint32_t pivot = nodes_[node].parent, other = sibling(node);
-        Box pivot_box = nodes_[other].box;            // the pivot's box without the moved subtree
-        float saved = nodes_[pivot].box.half_area();  // area that removing the subtree saves
+        Box pivot_box = nodes_[other].box;         // the pivot's box without the moved subtree
+        float saved = area_of(nodes_[pivot].box);  // area that removing the subtree saves
         for (;;) {
             stack.push_back({saved, other});
             while (!stack.empty()) {
+                if (steps == 0) return best;
+                --steps;
                 const auto [here, target] = stack.back();
                 stack.pop_back();
-                if (!(here - area > best.gain)) continue;  // also if areas are infinite and the difference is NaN
+                if (here - area <= best.gain) continue;
                 const LinkedNode& at = nodes_[target];
-                const float enlarged = joined(at.box, box).half_area();
+                const float enlarged = area_of(joined(at.box, box));
                 if (here - enlarged > best.gain) best.gain = here - enlarged, best.target = target;
-                const float below = here + at.box.half_area() - enlarged;
+                const float below = here + area_of(at.box) - enlarged;
                 if (!at.is_leaf() && below - area > best.gain) {
                     stack.push_back({below, at.child[0]});
                     stack.push_back({below, at.child[1]});
                 }
             }
-            if (nodes_[pivot].parent == none) return best;
-            if (pivot != nodes_[node].parent) saved += nodes_[pivot].box.half_area() - pivot_box.half_area();
+            if (nodes_[pivot].parent == none || steps == 0) return best;
+            --steps;
+            if (pivot != nodes_[node].parent) saved += area_of(nodes_[pivot].box) - area_of(pivot_box);
             other = sibling(pivot);
             pivot_box.grow(nodes_[other].box);
             pivot = nodes_[pivot].parent;
@@ -133,9 +148,14 @@ private:
         std::vector<Move> moves(used_);
         parallel_chunks(used_, chunk_size, threads, [&](std::size_t begin, std::size_t end) {
             std::vector<std::pair<float, std::uint32_t>> stack;
-            for (std::size_t i = begin; i < end; ++i) {
+            std::size_t left = most_steps() * (end - begin) / used_;
+            for (std::size_t i = begin; i < end && left > 0; ++i) {
                 const std::uint32_t node = static_cast<std::uint32_t>(i);
-                if (node != root_ && nodes_[node].parent != root_) moves[i] = find_move(node, stack);
+                if (node == root_ || nodes_[node].parent == root_) continue;
+                const auto allowed = static_cast<std::uint32_t>(std::min<std::size_t>(left, longest_search));
+                std::uint32_t steps = allowed;
+                moves[i] = find_move(node, stack, steps);
+                left -= allowed - steps;
             }
         });
         std::erase_if(moves, [](const Move& move) { return move.target == none; });
@@ -143,7 +163,9 @@ private:
             return a.gain > b.gain || (a.gain == b.gain && a.node < b.node);
         });
         std::size_t moved = 0;
-        for (const Move& move : moves) moved += apply(move);
+        steps_ = 0;
+        for (const Move& move : moves)
+            if (steps_ < most_steps()) moved += apply(move);
         return moved > 0;
     }
 
@@ -151,10 +173,10 @@ private:
     bool apply(const Move& move) {
         const std::uint32_t parent = nodes_[move.node].parent, other = sibling(move.node);
         if (parent == root_ || move.target == parent || move.target == other) return false;
-        float gain = nodes_[parent].box.half_area();
+        float gain = area_of(nodes_[parent].box);
         gain += remove(parent, other);
         bool target_is_outside = true;  // of the moved subtree, into which an earlier move may have taken the target
-        for (std::uint32_t i = move.target; i != none && target_is_outside; i = nodes_[i].parent)
+        for (std::uint32_t i = move.target; i != none && target_is_outside; i = nodes_[i].parent, ++steps_)
             target_is_outside = i != move.node;
         if (target_is_outside) {
             gain -= insert(move.node, parent, move.target);
@@ -172,11 +194,11 @@ private:
         nodes_[above].replace_child(parent, other);
         nodes_[other].parent = above;
         float shrunk = 0;
-        for (std::uint32_t i = above; i != none; i = nodes_[i].parent) {
+        for (std::uint32_t i = above; i != none; i = nodes_[i].parent, ++steps_) {
             LinkedNode& at = nodes_[i];
             const Box box = joined(nodes_[at.child[0]].box, nodes_[at.child[1]].box);
             if (are_equal(box, at.box)) break;
-            shrunk += at.box.half_area() - box.half_area();
+            shrunk += area_of(at.box) - area_of(box);
             at.box = box;
         }
         return shrunk;
@@ -190,18 +212,21 @@ private:
         nodes_[parent].child = {node, target};
         nodes_[node].parent = nodes_[target].parent = parent;
         nodes_[parent].box = joined(nodes_[node].box, nodes_[target].box);
-        float grown = nodes_[parent].box.half_area();
-        for (std::uint32_t i = above; i != none; i = nodes_[i].parent) {
+        float grown = area_of(nodes_[parent].box);
+        for (std::uint32_t i = above; i != none; i = nodes_[i].parent, ++steps_) {
             LinkedNode& at = nodes_[i];
             const Box box = joined(at.box, nodes_[node].box);
             if (are_equal(box, at.box)) break;
-            grown += box.half_area() - at.box.half_area();
+            grown += area_of(box) - area_of(at.box);
             at.box = box;
         }
         return grown;
     }
 
     LargeArray<LinkedNode> nodes_;
+    float area_scale_;
+    std::size_t count_;      // references
+    std::size_t steps_ = 0;  // nodes that the moves of this round have looked at
     std::uint32_t used_ = 0, root_ = 0;
 };
 
@@ -242,7 +267,7 @@ private:
         if (!top.has_node()) {
             std::uint32_t place = top.begin;
             write_block(index, place);
-            return block_costs(node.box);
+            return block_costs(node.box, tree_.area_scale);
         }
         auto [left, right] = node.child;
         const Float4v a = linked_[left].box.lo + linked_[left].box.hi,

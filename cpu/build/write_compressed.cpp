@@ -70,7 +70,7 @@ public:
         const auto end = vertices_.begin() + count_;
         const auto found = std::find(vertices_.begin(), end, bits);
         if (found == end) {
-            assert(count_ < static_cast<int>(vertices_.size()));  // four triangles have no more corners
+            ensure(count_ < static_cast<int>(vertices_.size()), "at most twelve corners of four triangles");
             vertices_[static_cast<std::size_t>(count_++)] = bits;
         }
         return static_cast<int>(found - vertices_.begin());
@@ -78,7 +78,7 @@ public:
     int count() const { return count_; }
     // The number of vertices that a block for these has room for.
     int stored() const {
-        assert(count_ <= CompressedBlock::most_vertices);
+        ensure(count_ <= CompressedBlock::most_vertices, "at most eight vertices in a block");
         return count_ <= CompressedBlock::few_vertices ? CompressedBlock::few_vertices : CompressedBlock::most_vertices;
     }
     std::size_t units() const { return CompressedBlock::units(static_cast<std::size_t>(stored())); }
@@ -206,9 +206,10 @@ LeafSize CompressedWriter::leaf_size(const Mesh<float>& mesh, std::span<const st
 }
 
 LeafSize CompressedWriter::write_leaf(const Mesh<float>& mesh, Accuracy, std::span<const std::uint32_t> prims,
-                                      std::byte* out) {
+                                      std::span<std::byte> out) {
     return pack_leaf(mesh, prims, [&](auto block_prims, const SharedVertices& vertices, std::size_t unit) {
-        write_block(mesh, block_prims, vertices, out + unit * unit_bytes);
+        ensure((unit + vertices.units()) * unit_bytes <= out.size(), "a leaf within the memory planned");
+        write_block(mesh, block_prims, vertices, out.data() + unit * unit_bytes);
     });
 }
 

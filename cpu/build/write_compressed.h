@@ -23,7 +23,8 @@ struct CompressedWriter {
     static LeafSize leaf_size(const Mesh<float>& mesh, std::span<const std::uint32_t> prims);
     // Writes the leaf and returns its size. The bytes do not depend on the accuracy: blocks hold vertices for all
     // three.
-    static LeafSize write_leaf(const Mesh<float>& mesh, Accuracy, std::span<const std::uint32_t> prims, std::byte* out);
+    static LeafSize write_leaf(const Mesh<float>& mesh, Accuracy, std::span<const std::uint32_t> prims,
+                               std::span<std::byte> out);
 };
 
 // Compressed nodes over blocks of doubles.

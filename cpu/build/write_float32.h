@@ -21,7 +21,7 @@ struct Float32Writer {
     static void write_node(const wive::Node& node, int, Node& out) { out = node; }
     static constexpr std::size_t leaf_units(std::uint32_t triangles) { return blocks_for(triangles) * Block::units(); }
     static LeafSize write_leaf(const Mesh<Real>& mesh, Accuracy accuracy, std::span<const std::uint32_t> prims,
-                               std::byte* out);
+                               std::span<std::byte> out);
 };
 
 }  // namespace wive

@@ -47,17 +47,22 @@ void clear_block(TriangleBlockOf<Real>& block) {
         std::memset(reinterpret_cast<std::byte*>(&block + 1) - block_padding<Real>, 0, block_padding<Real>);
 }
 
+// Makes the lane unused if the triangle is out of range.
 template <class Real>
 void write_triangle(TriangleBlockOf<Real>& block, std::uint32_t lane, const Mesh<Real>& mesh, std::uint32_t prim,
                     Accuracy accuracy) {
-    const Real* first = mesh.corner(prim, 0);
+    Real corners[3][3];
+    const bool in_range = mesh.load_corners(prim, corners);
     for (int k = 0; k < 3; ++k) {
-        const Real* corner = mesh.corner(prim, k);
         const bool edge = accuracy == Accuracy::fast && k > 0;
         for (int axis = 0; axis < 3; ++axis)
-            block.rows[triangle_row(k, axis)][lane] = edge ? corner[axis] - first[axis] : corner[axis];
+            block.rows[triangle_row(k, axis)][lane] = edge ? corners[k][axis] - corners[0][axis] : corners[k][axis];
     }
     block.prim[lane] = static_cast<std::int32_t>(prim);
+    if (in_range) [[likely]]
+        return;
+    for (auto& row : block.rows) row[lane] = std::numeric_limits<Real>::quiet_NaN();
+    block.prim[lane] = -1;
 }
 
 }  // namespace wive

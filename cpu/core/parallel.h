@@ -13,6 +13,7 @@
 #include <thread>
 #include <vector>
 
+#include "core/default_floats.h"
 #include "core/memory.h"
 
 #if defined(__linux__)
@@ -120,6 +121,7 @@ private:
 
     // A helper's loop.
     void help() {
+        const DefaultFloats floats;  // not every system lets a new thread inherit its creator's
         {
             const std::lock_guard lock(mutex_);
             ++begun_;

@@ -85,7 +85,7 @@ std::uint64_t render(const PyBvh& self, const KernelArg& kernel, const Array<flo
                            image.mutable_data(),
                            in_flight,
                            foreign_tracer(tracer)};
-    py::gil_scoped_release release;
+    const Released released;
     if (check) {  // the arrays are the caller's, who may have changed them since the tree was built
         Threads checkers(thread_count(threads));
         check_mesh(job.mesh, checkers);
@@ -100,6 +100,16 @@ py::array_t<T> view(py::handle owner, std::vector<py::ssize_t> shape, const T* d
     array.attr("setflags")(py::arg("write") = false);
     return array;
 }
+
+// DefaultFloats for a `with` block, on the thread that runs it.
+class PyDefaultFloats {
+public:
+    void enter() { floats_.emplace(); }
+    void exit(const py::args&) { floats_.reset(); }
+
+private:
+    std::optional<DefaultFloats> floats_;
+};
 
 constexpr std::size_t word_bytes = sizeof(std::uint32_t), unit_words = unit_bytes / word_bytes;
 
@@ -151,6 +161,10 @@ PYBIND11_MODULE(_cpu, m, pybind11::mod_gil_not_used()) {
     py::class_<PyKernels>(m, "Kernels")
         .def(py::init<std::string>(), py::arg("name"))
         .def_property_readonly("name", &PyKernels::name);
+    py::class_<PyDefaultFloats>(m, "DefaultFloats")
+        .def(py::init<>())
+        .def("__enter__", &PyDefaultFloats::enter)
+        .def("__exit__", &PyDefaultFloats::exit);
     PyBvhClass bvh(m, "Bvh");
     for_each_precision([&]<class Real>(Real) {
         bvh.def(py::init(&build<Real>), array_arg("vertices"), array_arg("faces"), py::arg("accuracy") = "watertight",
@@ -213,6 +227,7 @@ PYBIND11_MODULE(_cpu, m, pybind11::mod_gil_not_used()) {
         .def_property_readonly("memory", [](const PyBvh& self) { return self.bvh().bytes(); })
         .def_property_readonly("sah",
                                [](const PyBvh& self) {
+                                   const DefaultFloats floats;
                                    const Bvh::Sah sah = self.bvh().sah();
                                    return py::make_tuple(sah.nodes, sah.blocks);
                                })

@@ -15,6 +15,7 @@
 #include <variant>
 
 #include "build/builder.h"
+#include "core/default_floats.h"
 #include "kernels/dispatch.h"
 
 namespace wive {
@@ -36,6 +37,12 @@ void expect_shape(const Array<T>& array, py::ssize_t columns, const char* messag
     expect(array.ndim() == 2 && array.shape(1) == columns, message);
 }
 
+// Releases the interpreter lock, and computes in the core's own floating-point environment meanwhile.
+struct Released {
+    py::gil_scoped_release release;
+    DefaultFloats floats;
+};
+
 // A tree together with the arrays it was built from, which rendering reads.
 class PyBvh {
 public:
@@ -46,7 +53,7 @@ public:
         expect_shape(faces_, 3, "faces: expected shape (f, 3)");
         expect(options.depth_limit >= 1 && options.depth_limit <= max_depth, "depth_limit: expected 1 to 64");
         const Mesh view = mesh<Real>();
-        py::gil_scoped_release release;
+        const Released released;
         bvh_ = std::make_unique<Bvh>(view, options_);
     }
 
@@ -58,7 +65,7 @@ public:
         expect_shape(std::get<Array<Real>>(vertices_), 3, "vertices: expected shape (v, 3)");
         options_.threads = threads;
         const Mesh view = mesh<Real>();
-        py::gil_scoped_release release;
+        const Released released;
         bvh_ = other.bvh_->refitted(view, threads);
         if (!bvh_) bvh_ = std::make_unique<Bvh>(view, options_);
     }

@@ -63,7 +63,7 @@ template <class Real>
 void trace_released(const QueryCall<Real>& call, QueryKind query, const HitBatch<Real>& hits) {
     const TraceBatch<Real> kernel = call.kernel(query);
     const BvhView bvh = call.tree.bvh().view();
-    py::gil_scoped_release release;
+    const Released released;
     trace(call.kernels, kernel, bvh, call.rays, hits, call.size(), call.threads, call.in_flight);
 }
 
@@ -117,7 +117,7 @@ py::tuple intersect_all(const QueryCall<Real>& call) {
     std::int64_t* offsets_data = offsets.mutable_data();
     std::optional<HitCollector<Real>> collector;
     {
-        py::gil_scoped_release release;
+        const Released released;
         collector.emplace(call.kernels, kernel, bvh, call.rays, call.size(), steps_data, call.threads, call.in_flight,
                           call.max_bytes);
         collector->write_offsets(offsets_data);
@@ -127,7 +127,7 @@ py::tuple intersect_all(const QueryCall<Real>& call) {
     Array<std::int32_t> prim(total);
     const SortedHits<Real> hits = {offsets_data, t.mutable_data(), prim.mutable_data(), uv.mutable_data()};
     {
-        py::gil_scoped_release release;
+        const Released released;
         collector->sort_into(hits);
         collector.reset();  // here, because long lists take a while to free
     }

@@ -28,6 +28,13 @@ constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 
 using TriangleCorners = const double (*)[3];
 
+// An index in an array of the caller's, which another thread may write to: read once, so that what is checked is what
+// is used.
+template <class Index>
+std::size_t load_index(const Index* from) {
+    return static_cast<std::size_t>(static_cast<std::make_unsigned_t<Index>>(__atomic_load_n(from, __ATOMIC_RELAXED)));
+}
+
 // Calls row(i, corners of the triangle of hit i, in double) on every core, with the interpreter lock released. The
 // corners of a miss are null.
 template <class Real, class Row>
@@ -40,16 +47,16 @@ void for_each_hit(const Array<Real>& vertices, const Array<std::int32_t>& faces,
     const auto face_count = static_cast<std::size_t>(faces.shape(0)),
                point_count = static_cast<std::size_t>(vertices.shape(0));
     const auto hits = static_cast<std::size_t>(prim.size());
-    py::gil_scoped_release release;
+    const Released released;
     Threads threads(hits > hits_per_chunk ? thread_count(0) : 1);
     parallel_chunks(hits, hits_per_chunk, threads, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) {
-            const auto face = static_cast<std::size_t>(static_cast<std::uint32_t>(prims[i]));
+            const auto face = load_index(prims + i);
             double corner[3][3];
             bool known = face < face_count;
             for (std::size_t k = 0; known && k < 3; ++k) {
-                const auto vertex = static_cast<std::size_t>(static_cast<std::uint32_t>(corners[3 * face + k]));
-                known = vertex < point_count;  // the arrays are the caller's, who may have changed them since
+                const auto vertex = load_index(corners + 3 * face + k);
+                known = vertex < point_count;
                 for (std::size_t axis = 0; known && axis < 3; ++axis) corner[k][axis] = points[3 * vertex + axis];
             }
             row(i, known ? corner : nullptr);
@@ -133,7 +140,7 @@ py::array_t<double> points_on_rays(const Array<double>& vertices, const Array<st
     auto answer = make_rows<double>(prim.size());
     double* rows = answer.mutable_data();
     for_each_hit(vertices, faces, prim, [=](std::size_t i, TriangleCorners corner) {
-        const auto index = static_cast<std::uint64_t>(rays[i]);
+        const std::size_t index = load_index(rays + i);
         double* out = rows + 3 * i;
         if (!corner || index >= ray_count) {
             std::fill_n(out, 3, nan);

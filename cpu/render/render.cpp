@@ -138,7 +138,7 @@ private:
         std::size_t alive = 0;
         for (std::size_t i = 0; i < paths_.size(); ++i) {
             Path path = paths_[i];
-            if (prim_[i] < 0) {
+            if (static_cast<std::uint32_t>(prim_[i]) >= job_.mesh.face_count) {  // no hit is no_prim
                 sums[path.pixel] = sums[path.pixel] + path.throughput;
                 continue;
             }

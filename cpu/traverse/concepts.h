@@ -136,14 +136,14 @@ concept SlabTest =
 // What is kept of the hits of one ray.
 template <class Q, class Real>
 concept RayQuery = std::same_as<decltype(Q::interval), Interval<Real>> &&  // in which hits still count
-                   requires(const Q query, const HitBatch<Real>& hits, std::size_t i, Real scale) {
+                   requires(const Q query, const HitBatch<Real>& hits, std::size_t i, Real unscale) {
                        typename Q::InFlight;  // the variant of the query for rays in flight
                        // Whether children are visited front to back, because the interval shrinks with every hit.
                        { Q::in_order } -> std::convertible_to<bool>;
                        // Whether the number of hits matters: exact tests then perturb edges, so that a ray through
                        // an edge or a vertex crosses a closed surface once.
                        { Q::perturb_edges } -> std::convertible_to<bool>;
-                       query.write(hits, i, scale);  // writes the result of ray i; scale: see RayFrame
+                       query.write(hits, i, unscale);  // writes the result of ray i; unscale: see RayFrame
                    };
 
 // A query that checks itself whether a hit lies in the interval; prim is that of the triangle.

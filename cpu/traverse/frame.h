@@ -16,8 +16,12 @@
 
 namespace wive::WIVE_ISA {
 
-// The direction is scaled by a power of two so that its largest component lies in [1, 2); t scales with it, and
-// both scalings are exact. Everything below is in these scaled units until a hit is written.
+// The direction is divided by a power of two so that its longest component lies in [1, 2), whatever its length; t
+// scales with it, and both scalings are exact. Everything below is in these scaled units until a hit is written.
+//
+// Nothing here or in a slab test overflows: |r| is at most 2^30, planes and origins are below 2^62 (max_coordinate),
+// the planes of empty lanes 2^80 (empty_plane), so no distance exceeds 2^111 and none is NaN. An empty lane's box,
+// whose near plane lies 2^81 behind its far plane on every axis, is therefore never hit.
 //
 // Slabs are conservative at no cost to the loop. With planes p and origin o relative to the tree's centre, the
 // distance to a plane is computed as fma(p, r, bias), r = 1/d and bias = -o r -+ slack, where, in the roundoff
@@ -35,8 +39,7 @@ namespace wive::WIVE_ISA {
 // vertices sideways by multiples of 2^-53 M; if rounding of the weights would move a hit by more, they are computed
 // exactly (triangle_watertight_float64.h), so that a hit lies no more than 3u M aside: 13u M in all with compressed
 // planes. A component smaller than 2^-30 of the longest is replaced by that, with its sign: along the
-// ray that moves a point by less than 2^-29 M, which the same slack covers. (A subnormal direction stays shorter than 1
-// when scaled.)
+// ray that moves a point by less than 2^-29 M, which the same slack covers.
 //
 // Real is the precision of the caller's rays and of the triangle test.
 template <Isa I>
@@ -52,7 +55,7 @@ struct RayFrame {
     alignas(16) float near_bias[4];
     alignas(16) float far_bias[4];
     Interval<Real> interval;
-    Real scale;  // t of the caller's ray = scale * t here
+    Real unscale;  // a power of two; t here = unscale * t of the caller's ray
     // The rows of planes that the ray meets first and last on each axis, in planes from the node's first.
     std::uint32_t near_row[3], far_row[3];
     // The shift to the ray's octant in a lane of the order row, four bits per octant; farthest child first.
@@ -76,19 +79,28 @@ struct RayFrame {
         using Bits = std::conditional_t<sizeof(Real) == sizeof(float), std::uint32_t, std::uint64_t>;
         constexpr int mantissa = std::numeric_limits<Real>::digits - 1;
         constexpr Bits one = std::bit_cast<Bits>(Real{1}) >> mantissa;  // the exponent field of 1
-        Bits exponent = std::bit_cast<Bits>(longest) >> mantissa;
-        exponent = exponent > 2 * one - 1 ? 2 * one - 1 : exponent;
-        scale = std::bit_cast<Real>((2 * one - exponent) << mantissa);
-        const Real unscale = std::bit_cast<Real>(exponent > 0 ? exponent << mantissa : Bits{1} << (mantissa - 1));
+        const Bits exponent = std::bit_cast<Bits>(longest) >> mantissa;
+        unscale = std::bit_cast<Real>(exponent << mantissa);
+        Real4 scaled_direction = caller_direction * Real4::all(std::bit_cast<Real>((2 * one - exponent) << mantissa));
+        Real scaled_longest = longest * std::bit_cast<Real>((2 * one - exponent) << mantissa);
+        if (exponent - 1 >= 2 * one - 1) [[unlikely]] {
+            // The longest component is subnormal, or the reciprocal of its power of two is.
+            constexpr Real up = static_cast<Real>(Bits{1} << (mantissa + 1));  // makes any subnormal number normal
+            if (exponent == 0) {
+                const Bits normal_exponent = std::bit_cast<Bits>(longest * up) >> mantissa;
+                unscale = std::bit_cast<Real>(normal_exponent << mantissa) / up;
+            }
+            scaled_direction = caller_direction / Real4::all(unscale);
+            scaled_longest = longest / unscale;
+        }
         interval = Interval<Real>::of(caller_tmin * unscale, caller_tmax * unscale);
 
         constexpr float smallest_part = 0x1p-30f, slack_factor = 0x1p-20f;
-        constexpr float least_magnitude = 0x1p-100f;  // keeps the slack from vanishing if everything is tiny
-        const Real4 scaled_direction = caller_direction * Real4::all(scale);
+        constexpr float least_magnitude = 0x1p-100f;             // keeps the slack from vanishing if everything is tiny
         const Float4 scaled = Float4::narrow(scaled_direction);  // signs are kept, even if a component becomes zero
         const Float4 relative = Float4::narrow(caller_origin - Real4::of(Float4::load(bvh.center)));
         const float magnitude = highest_lane(Float4::load(bvh.extent) + abs(relative)) + least_magnitude;
-        const float smallest = static_cast<float>(longest * scale) * smallest_part;
+        const float smallest = static_cast<float>(scaled_longest) * smallest_part;
         const Float4 size = Float4::all(1.0f) / max(abs(scaled), Float4::all(smallest));
         const Float4 reciprocal = flip_sign(size, scaled);
         const Float4 distance = relative * reciprocal, slack = size * Float4::all(magnitude * slack_factor);
@@ -110,11 +122,12 @@ struct RayFrame {
 
     // What load() guarantees when it returns true; asserted when traversal begins.
     [[gnu::always_inline]] bool is_finite() const {
+        constexpr float most_rdir = 0x1p30f, most_bias = 0x1p93f;
         bool finite = interval.tmin <= interval.tmax;
         for (int axis = 0; axis < 3; ++axis)
             finite = finite && __builtin_isfinite(origin[axis]) && __builtin_isfinite(direction[axis]) &&
-                     __builtin_isfinite(rdir[axis]) && __builtin_isfinite(near_bias[axis]) &&
-                     __builtin_isfinite(far_bias[axis]);
+                     __builtin_fabsf(rdir[axis]) <= most_rdir && __builtin_fabsf(near_bias[axis]) <= most_bias &&
+                     __builtin_fabsf(far_bias[axis]) <= most_bias;
         return finite;
     }
 };

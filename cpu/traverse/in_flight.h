@@ -197,7 +197,7 @@ private:
         ends_.done = done_queue_;
         for (State** i = done_queue_; i != last; ++i) {
             State& f = **i;
-            f.query.write(hits_, f.index, f.ray.scale);
+            f.query.write(hits_, f.index, f.ray.unscale);
             f.counters.write(hits_, f.index);
             start_next_ray(f);
         }

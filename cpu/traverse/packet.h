@@ -56,7 +56,7 @@ public:
         split_rays_ = 0;
         walk_packet();
         for (unsigned i = 0; i < packet_size; ++i)
-            if ((split_rays_ >> i & 1u) == 0) query_[i].write(hits_, first + i, ray_[i].scale);
+            if ((split_rays_ >> i & 1u) == 0) query_[i].write(hits_, first + i, ray_[i].unscale);
         return single_steps_ * worthwhile_ratio.den >= packet_steps_ * worthwhile_ratio.num ? Outcome::worthwhile
                                                                                             : Outcome::not_worthwhile;
     }
@@ -136,7 +136,7 @@ private:
         for (unsigned i = 0; i < packet_size; ++i) {
             Frame& ray = ray_[i];
             if (!ray.load(bvh_, rays_, first + i)) return false;
-            if ((ray.order_shift != ray_[0].order_shift) | (ray.scale != ray_[0].scale)) return false;
+            if ((ray.order_shift != ray_[0].order_shift) | (ray.unscale != ray_[0].unscale)) return false;
             assert(ray.is_finite());
             const Float4 rdir = Float4::load(ray.rdir);
             const Float4 origin = Float4::narrow(Real4::load(ray.origin) - Real4::of(Float4::load(bvh_.center)));

@@ -61,10 +61,10 @@ struct ClosestHit {
         }
         return false;
     }
-    [[gnu::always_inline]] void write(const HitBatch<Real>& hits, std::size_t i, Real scale) const {
+    [[gnu::always_inline]] void write(const HitBatch<Real>& hits, std::size_t i, Real unscale) const {
         const bool hit = best.prim != no_prim;
         constexpr Real nan = std::numeric_limits<Real>::quiet_NaN();
-        hits.t[i] = hit ? best.t * scale : std::numeric_limits<Real>::infinity();
+        hits.t[i] = hit ? best.t / unscale : std::numeric_limits<Real>::infinity();
         hits.prim[i] = static_cast<std::int32_t>(static_cast<std::uint32_t>(best.prim));
         if (hits.uv) {
             hits.uv[2 * i] = hit ? best.u : nan;

@@ -38,14 +38,14 @@ struct AllHits {
     static constexpr bool perturb_edges = true;
 
     Interval<Real> interval{};
-    Real scale = 1;
+    Real unscale = 1;  // as RayFrame has it
     std::int32_t count = 0;
     std::size_t ray = 0;
     HitList<Real>* found = nullptr;
 
     [[gnu::always_inline]] bool offer(Real t, Real u, Real v, std::uint32_t prim) {
         if (interval.holds(t)) {
-            found->add({ray, t * scale, u, v, static_cast<std::int32_t>(prim)});
+            found->add({ray, t / unscale, u, v, static_cast<std::int32_t>(prim)});
             ++count;
         }
         return false;

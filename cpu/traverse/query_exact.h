@@ -15,6 +15,7 @@ struct ExactClosestHit {
     static constexpr bool in_order = true;
     static constexpr bool perturb_edges = false;
     static constexpr bool wants_uv = true;
+    static constexpr float lowest = std::numeric_limits<float>::lowest();
 
     Interval<float> interval{};  // for the boxes, in the frame's units; ends at the best hit
     RoundedHit best{std::numeric_limits<float>::infinity(), 0, 0};
@@ -39,8 +40,11 @@ struct ExactClosestHit {
         prim = hit_prim;
         block = &hit_block;
         lane = hit_lane;
-        // The slack of the boxes (frame.h) is larger than the rounding of t, unless t is subnormal.
-        interval.end_at((hit.t + 0x1p-148f) * unscale);
+        // The slack of the boxes (frame.h) is larger than the rounding of t, unless t is subnormal or, below the lowest
+        // float, infinite: then nearer hits are infinite as well, and no box that lies before the lowest float is
+        // skipped.
+        const float t = hit.t < lowest ? lowest : hit.t;
+        interval.end_at((t + 0x1p-148f) * unscale);
         return false;
     }
     [[gnu::always_inline]] void write(const HitBatch<float>& hits, std::size_t i, float) const {

@@ -187,12 +187,12 @@ void trace_one_by_one(const BvhView& bvh, const RayBatch<typename I::Real>& rays
             typename Triangles<I>::Frame ray;
             Query query{};
             Counters counters;
-            ray.scale = 1;
+            ray.unscale = 1;
             if (ray.load(bvh, rays, i)) {
                 query = start_query<Query>(ray, hits, i);
                 traverse<I, Slabs, Triangles>(bvh, ray, query, counters);
             }
-            query.write(hits, i, ray.scale);
+            query.write(hits, i, ray.unscale);
             counters.write(hits, i);
         }
 }
@@ -225,7 +225,7 @@ template <class Query, Isa I>
 [[gnu::always_inline]] inline Query start_query(const RayFrame<I>& ray, const HitBatch<typename I::Real>& hits,
                                                 std::size_t i) {
     if constexpr (requires { &Query::found; })
-        return {.interval = ray.interval, .scale = ray.scale, .ray = i, .found = hits.found};
+        return {.interval = ray.interval, .unscale = ray.unscale, .ray = i, .found = hits.found};
     else
         return {ray.interval};
 }

@@ -17,25 +17,27 @@ template <Isa I>
 struct ExactFrame : AxisFrame<I> {
     float caller_direction[3];
     float caller_tmin, caller_tmax;
-    float unscale;        // t here = unscale * t of the caller's ray
     double from[3];       // the origin on axis[0], axis[1] and axis[2]
     double shear[2];      // the direction on axis[0] and axis[1] / that on axis[2]
     double inverse;       // 1 / the direction on axis[2]
     double weight_bound;  // no weight of any triangle in the tree is off by more
 
     [[gnu::always_inline]] bool load(const BvhView& bvh, const RayBatch<float>& rays, std::size_t i) {
-        if (!AxisFrame<I>::load(bvh, rays, i)) [[unlikely]]
-            return false;
-        using Float4 = typename I::Float4;
-        const auto& axis = this->axis;
-        const float *o = rays.origins + 3 * i, *d = rays.directions + 3 * i;
-        for (int k = 0; k < 3; ++k) {
-            caller_direction[k] = d[k];
-            from[k] = o[axis[k]];
+        // Read once: the arrays are the caller's, and another thread may write to them.
+        float caller_origin[3];
+        for (std::size_t k = 0; k < 3; ++k) {
+            caller_origin[k] = rays.origins[3 * i + k];
+            caller_direction[k] = rays.directions[3 * i + k];
         }
         caller_tmin = rays.tmin[i * rays.tmin_stride];
         caller_tmax = rays.tmax[i * rays.tmax_stride];
-        unscale = 1.0f / this->scale;
+        if (!AxisFrame<I>::load(bvh, {caller_origin, caller_direction, &caller_tmin, &caller_tmax, 0, 0}, 0))
+            [[unlikely]]
+            return false;
+        using Float4 = typename I::Float4;
+        const auto& axis = this->axis;
+        const float* d = caller_direction;
+        for (int k = 0; k < 3; ++k) from[k] = caller_origin[axis[k]];
         inverse = 1.0 / d[axis[2]];
         shear[0] = slope(d[axis[0]] * inverse);
         shear[1] = slope(d[axis[1]] * inverse);

@@ -76,7 +76,7 @@ def make_functions(
         if ray.valid and not _refused(bvh.error, bvh.stack, bvh.accuracy, wanted, bvh.refusal):
             best = trace_closest(bvh, ray, 0, begin_closest(ray)).found
             if best.prim != NO_PRIM:
-                hit.t = distance(best, ray.scale)
+                hit.t = distance(best, ray.unscale)
                 hit.u = best.u
                 hit.v = best.v
                 hit.prim = best.prim

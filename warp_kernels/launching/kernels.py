@@ -136,7 +136,7 @@ def _closest_kernel(
                 if uv:
                     uv[i] = vec2(real(wp.nan), real(wp.nan))
         elif own == winner:
-            t[i] = distance(result.found, ray.scale)
+            t[i] = distance(result.found, ray.unscale)
             prim[i] = result.found.prim
             if uv:
                 uv[i] = vec2(result.found.u, result.found.v)
@@ -225,7 +225,7 @@ def _all_kernel(parts: SimpleNamespace, hit_type: type) -> wp.Kernel:
             return
         ray = load_ray(tree, origins, directions, tmin, tmax, i)
         found = begin(ray)
-        found.scale = ray.scale
+        found.unscale = ray.unscale
         found.hits = address_of_hit(hits, first)
         found.remaining = address_of_count(remaining, i)
         trace(tree, ray, lane, found)

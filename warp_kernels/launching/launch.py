@@ -10,7 +10,7 @@ import warp as wp
 from wive.warp_kernels.launching.kernels import make_kernel
 from wive.warp_kernels.launching.sorting import shift_counts, sort_kernel
 from wive.warp_kernels.tree.handle import HITS
-from wive.warp_kernels.tree.quiet import cpu_blocks
+from wive.warp_kernels.tree.quiet import cpu_blocks, launch
 from wive.warp_kernels.tree.tree import Tree
 
 Lanes = Literal[1, 8]
@@ -116,7 +116,7 @@ def scan_counts(counts: wp.array[Any]) -> wp.array[Any]:
     """
     shifted = wp.empty(len(counts) + 1, dtype=wp.int64, device=counts.device)
     offsets = wp.empty_like(shifted)
-    wp.launch(shift_counts, len(shifted), [counts], [shifted], device=counts.device, record_tape=False)
+    launch(shift_counts, len(shifted), [counts], [shifted], device=counts.device, record_tape=False)
     wp.utils.array_scan(shifted, offsets, inclusive=True)
     return offsets
 
@@ -150,7 +150,7 @@ def launch_all(
     hits = wp.empty(len(t), dtype=HITS[tree.precision], device=tree.device)
     rays = (origins, directions, tmin, tmax)
     _launch("all", tree, rays, (offsets, counts, hits), lanes, block_dim, stream)
-    wp.launch(
+    launch(
         sort_kernel(tree.precision),
         len(counts),
         [offsets, counts, hits],
@@ -187,11 +187,11 @@ def _launch(
         return
     kernel = make_kernel(query, tree.accuracy, lanes, tree.stack, counters, tree.nodes, tree.precision)
     with cpu_blocks(lanes == 1 and tree.device.is_cpu):
-        wp.launch(
+        launch(
             kernel,
-            dim=(len(rays[0]), 8 // lanes),
-            inputs=[tree.handle, *rays],
-            outputs=list(outputs),
+            (len(rays[0]), 8 // lanes),
+            [tree.handle, *rays],
+            list(outputs),
             device=tree.device,
             stream=stream,
             block_dim=block_dim,

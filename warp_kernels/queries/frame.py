@@ -14,6 +14,11 @@ MAX_DOUBLE = 1.7976931348623157e308
 SMALLEST_PART = wp.constant(wp.float32(2.0**-30))
 LEAST_MAGNITUDE = wp.constant(wp.float32(2.0**-100))
 SLACK_FACTOR = wp.constant(wp.float32(2.0**-20))
+# Make any subnormal number normal.
+NORMALISE = wp.constant(wp.float32(2.0**24))
+NORMALISE_64 = wp.constant(wp.float64(2.0**53))
+LEAST_NORMAL = wp.constant(wp.float32(2.0**-126))
+LEAST_NORMAL_64 = wp.constant(wp.float64(2.0**-1022))
 
 
 @wp.struct
@@ -27,7 +32,7 @@ class RayFrame:
     far_bias: wp.vec3
     tmin: wp.float32
     tmax: wp.float32
-    scale: wp.float32  # t of the caller's ray = scale * t here
+    unscale: wp.float32  # a power of two; t here = unscale * t of the caller's ray
     octant: wp.int32  # bit a: negative on axis a, from the sign of the reciprocal
     longest_axis: wp.int32
     given_direction: wp.vec3  # this and the limits below as the caller gave them, for exact trees
@@ -48,7 +53,7 @@ class RayFrame64:
     tmin: wp.float64
     tmax: wp.float64
     box_tmin: wp.float32  # tmin rounded down
-    scale: wp.float64
+    unscale: wp.float64
     octant: wp.int32
     longest_axis: wp.int32
     valid: wp.bool
@@ -122,22 +127,18 @@ def box_tmin(ray: RayFrame64):
 
 
 @wp.func
-def powers_of(longest: float):
-    """The power of two that scales the longest component to [1, 2), and its reciprocal."""
-    exponent = wp.min(wp.cast(longest, wp.uint32) >> wp.uint32(23), wp.uint32(253))
-    unscale_bits = wp.where(exponent > wp.uint32(0), exponent << wp.uint32(23), wp.uint32(1) << wp.uint32(22))
-    return wp.vec2(
-        wp.cast((wp.uint32(254) - exponent) << wp.uint32(23), wp.float32), wp.cast(unscale_bits, wp.float32)
-    )
+def power_of(longest: float):
+    """The largest power of two not above the longest component, which may be subnormal."""
+    up = wp.where(longest < LEAST_NORMAL, NORMALISE, 1.0)
+    exponent = wp.cast(longest * up, wp.uint32) >> wp.uint32(23)
+    return wp.cast(exponent << wp.uint32(23), wp.float32) / up
 
 
 @wp.func
-def powers_of(longest: wp.float64):
-    exponent = wp.min(wp.cast(longest, wp.uint64) >> wp.uint64(52), wp.uint64(2045))
-    unscale_bits = wp.where(exponent > wp.uint64(0), exponent << wp.uint64(52), wp.uint64(1) << wp.uint64(51))
-    return wp.vec2d(
-        wp.cast((wp.uint64(2046) - exponent) << wp.uint64(52), wp.float64), wp.cast(unscale_bits, wp.float64)
-    )
+def power_of(longest: wp.float64):
+    up = wp.where(longest < LEAST_NORMAL_64, NORMALISE_64, wp.float64(1.0))
+    exponent = wp.cast(longest * up, wp.uint64) >> wp.uint64(52)
+    return wp.cast(exponent << wp.uint64(52), wp.float64) / up
 
 
 @wp.func
@@ -166,12 +167,11 @@ def make_load_frame(precision: str, frame_type: type) -> wp.Function:
             if not (wp.abs(origin[axis]) <= max_coordinate and lengths[axis] <= max_component):
                 ray.valid = False
 
-        powers = powers_of(longest)
-        ray.scale = powers[0]
-        ray.tmin = tmin * powers[1]
-        ray.tmax = tmax * powers[1]
+        ray.unscale = power_of(longest)
+        ray.tmin = tmin * ray.unscale
+        ray.tmax = tmax * ray.unscale
         ray.origin = origin
-        ray.direction = direction * ray.scale
+        ray.direction = direction / ray.unscale
         scaled = wp.vec3()
         relative = wp.vec3()
         for axis in range(3):
@@ -188,7 +188,7 @@ def make_load_frame(precision: str, frame_type: type) -> wp.Function:
         for axis in range(3):
             magnitude = wp.max(magnitude, extent[axis] + wp.abs(relative[axis]))
         magnitude = magnitude + LEAST_MAGNITUDE
-        smallest = wp.float32(longest * ray.scale) * SMALLEST_PART
+        smallest = wp.float32(longest / ray.unscale) * SMALLEST_PART
         for axis in range(3):
             size = 1.0 / wp.max(wp.abs(scaled[axis]), smallest)
             reciprocal = flip_sign(size, scaled[axis])

@@ -51,14 +51,14 @@ class MultiHit:
 
     tmax: wp.float32  # in the frame's units
     count: wp.int32
-    scale: wp.float32  # t of the caller's ray = scale * t here
+    unscale: wp.float32  # as `RayFrame` has it
     hits: wp.uint64  # address of the ray's first `Hit`
     remaining: wp.uint64  # address of the number of hits still to be listed
 
 
 Best64 = derive_struct(Best, "Best64", "`Best` in a float64 tree.", t=wp.float64, u=wp.float64, v=wp.float64)
 MultiHit64 = derive_struct(
-    MultiHit, "MultiHit64", "`MultiHit` in a float64 tree.", tmax=wp.float64, scale=wp.float64
+    MultiHit, "MultiHit64", "`MultiHit` in a float64 tree.", tmax=wp.float64, unscale=wp.float64
 )
 
 
@@ -92,8 +92,8 @@ def make_queries(precision: str, best_type: Any, multi_hit_type: Any) -> dict[st
         return found
 
     @wp.func
-    def distance(best: best_type, scale: real):
-        return best.t * scale
+    def distance(best: best_type, unscale: real):
+        return best.t / unscale
 
     @wp.func
     def offer_closest(best: best_type, tmin: real, hit: vec3, prim: int):
@@ -124,7 +124,7 @@ def make_queries(precision: str, best_type: Any, multi_hit_type: Any) -> dict[st
     def offer_all(found: multi_hit_type, tmin: real, hit: vec3, prim: int):
         """List the hits in [tmin, tmax]."""
         if hit[0] >= tmin and hit[0] <= found.tmax:
-            list_hit(found.hits, found.remaining, hit[0] * found.scale, hit[1], hit[2], prim)
+            list_hit(found.hits, found.remaining, hit[0] / found.unscale, hit[1], hit[2], prim)
         return found
 
     return {

@@ -32,7 +32,7 @@ def begin_exact(ray: RayFrame):
 
 
 @wp.func
-def exact_distance(best: ExactBest, scale: float):
+def exact_distance(best: ExactBest, unscale: float):
     """t in the caller's units."""
     return best.given_t
 

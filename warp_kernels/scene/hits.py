@@ -17,6 +17,7 @@ from wive.warp_kernels.scene.memory import memory_errors
 from wive.warp_kernels.scene.rays import WarpRays
 from wive.warp_kernels.scene.spawn import bound_constants, bounds_kernel, spawn_constants, spawn_kernel
 from wive.warp_kernels.scene.surfaces import count_hits, hit_kernels, number_rays
+from wive.warp_kernels.tree.quiet import launch
 
 if TYPE_CHECKING:
     from wive.warp_kernels.scene.tracer import WarpTracer
@@ -69,7 +70,7 @@ class WarpHits:
         """What the kernel writes, one value per hit."""
         with memory_errors():
             output = wp.empty(len(self.prim), dtype=dtype, device=self.prim.device)
-        wp.launch(kernel, len(output), inputs, [output], device=output.device)
+        launch(kernel, len(output), inputs, [output], device=output.device)
         return output
 
 
@@ -85,14 +86,14 @@ class WarpAllHits(WarpHits):
     def counts(self) -> Any:
         """(n,) int32."""
         counts = wp.empty(len(self), dtype=wp.int32, device=self.offsets.device)
-        wp.launch(count_hits, len(counts), [self.offsets], [counts], device=counts.device)
+        launch(count_hits, len(counts), [self.offsets], [counts], device=counts.device)
         return counts
 
     @property
     def ray(self) -> Any:
         """(h,) int64."""
         ray = wp.empty(len(self.t), dtype=wp.int64, device=self.offsets.device)
-        wp.launch(number_rays, len(self), [self.offsets], [ray], device=ray.device)
+        launch(number_rays, len(self), [self.offsets], [ray], device=ray.device)
         return ray
 
     def __len__(self) -> int:

@@ -14,6 +14,7 @@ from wive._internal.picture import Image, Settings
 from wive.warp_kernels import check, launch_closest
 from wive.warp_kernels.scene import shading as warp_shading
 from wive.warp_kernels.scene.tracer import WarpTracer, choose_lanes
+from wive.warp_kernels.tree.quiet import launch
 
 # The tile and the wave of cpu/render/render.cpp: they say in which order a pixel's light is added up.
 TILE_WIDTH = 32
@@ -103,7 +104,7 @@ class _Paths:
         self.reserve(count)
         path, origins, directions = self.wave
         outputs = [path, self.throughput, self.last_bounce, origins, directions]
-        wp.launch(warp_shading.start_paths, count, [frame], outputs, device=device)
+        launch(warp_shading.start_paths, count, [frame], outputs, device=device)
         rays, bounce = 0, 0
         while count > 0:
             rays += count
@@ -112,7 +113,7 @@ class _Paths:
             count = int(self.alive.numpy()[0])
             bounce += 1
         light = [frame, bounce, self.throughput, self.last_bounce]
-        wp.launch(warp_shading.accumulate, pixels, light, [sums], device=device)
+        launch(warp_shading.accumulate, pixels, light, [sums], device=device)
         return rays
 
     def _bounce(self, frame: warp_shading.Frame, bounce: int, count: int) -> None:
@@ -134,4 +135,4 @@ class _Paths:
         inputs = [frame, bounce, self.bounces, self.coloured, *self.tracer.mesh]
         hits = [self.prim, self.uv, path, directions]
         outputs = [self.throughput, self.last_bounce, self.alive, *self.next_wave]
-        wp.launch(warp_shading.shade, count, [*inputs, *hits], outputs, device=device)
+        launch(warp_shading.shade, count, [*inputs, *hits], outputs, device=device)

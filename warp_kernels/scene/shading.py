@@ -8,6 +8,8 @@ In both, every float operation is rounded on its own: no fused multiply-adds, no
 import numpy as np
 import warp as wp
 
+from wive.warp_kernels.scene.surfaces import vertices_of
+
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
 ONE = np.float32(1)
@@ -182,12 +184,12 @@ def shade(
     """Mark paths that escape with their bounce; the others bounce, at most `bounces` times."""
     i = wp.tid()
     own = path[i]
-    if prim[i] < 0:
+    face = vertices_of(faces, prim[i], vertices.shape[0])
+    if face[0] < 0:
         last_bounce[own] = bounce
         return
     if bounce == bounces:
         return
-    face = faces[prim[i]]
     a = vertices[face[0]]
     b = vertices[face[1]]
     c = vertices[face[2]]

@@ -13,7 +13,7 @@ import warp as wp
 from wive import _cpu
 from wive._internal import error_bounds, spawn
 from wive.warp_kernels.lanes.precision import PRECISIONS
-from wive.warp_kernels.scene.surfaces import OPTIONS, in_double
+from wive.warp_kernels.scene.surfaces import OPTIONS, in_double, vertices_of
 
 BoundConstants = wp.types.vector(3, wp.float64)
 SpawnConstants = wp.types.vector(len(spawn.Rounding._fields), wp.float64)
@@ -90,10 +90,10 @@ def bounds_kernel(precision: str) -> Any:
         bounds: wp.array[wp.float64],
     ) -> None:
         i = wp.tid()
-        if prim[i] < 0:
+        face = vertices_of(faces, prim[i], vertices.shape[0])
+        if face[0] < 0:
             bounds[i] = wp.float64(wp.nan)
             return
-        face = faces[prim[i]]
         v0, v1, v2 = in_double(vertices[face[0]]), in_double(vertices[face[1]]), in_double(vertices[face[2]])
         origin, direction = in_double(origins[i]), in_double(directions[i])
         corners = wp.matrix_from_rows(v0, v1, v2)
@@ -121,10 +121,10 @@ def spawn_kernel(precision: str) -> Any:
         origins: wp.array[vec3],
     ) -> None:
         i = wp.tid()
-        if prim[i] < 0:
+        face = vertices_of(faces, prim[i], vertices.shape[0])
+        if face[0] < 0:
             origins[i] = vec3(real(wp.nan))
             return
-        face = faces[prim[i]]
         v0, v1, v2 = in_double(vertices[face[0]]), in_double(vertices[face[1]]), in_double(vertices[face[2]])
         corners = wp.matrix_from_rows(v0, v1, v2)
         u, v = wp.float64(uv[i][0]), wp.float64(uv[i][1])

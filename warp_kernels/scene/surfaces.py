@@ -23,6 +23,21 @@ def in_double(v: wp.vec3d) -> wp.vec3d:
     return v
 
 
+@wp.func
+def vertices_of(faces: wp.array[wp.vec3i], prim: int, vertex_count: int) -> wp.vec3i:
+    """A triangle's vertices; -1 if there is no such triangle or vertex.
+
+    On the host the arrays are the caller's, and another thread may write to them.
+    """
+    none = wp.vec3i(-1, -1, -1)
+    if prim < 0 or prim >= faces.shape[0]:
+        return none
+    face = faces[prim]
+    if wp.min(face) < 0 or wp.max(face) >= vertex_count:
+        return none
+    return face
+
+
 @functools.cache
 def hit_kernels(precision: str) -> SimpleNamespace:
     """The kernels for scenes of that precision, compiled together."""
@@ -45,10 +60,10 @@ def hit_kernels(precision: str) -> SimpleNamespace:
         points: wp.array[wp.vec3d],
     ) -> None:
         i = wp.tid()
-        if prim[i] < 0:
+        face = vertices_of(faces, prim[i], vertices.shape[0])
+        if face[0] < 0:
             points[i] = wp.vec3d(wp.float64(wp.nan))
             return
-        face = faces[prim[i]]
         u = wp.float64(uv[i][0])
         v = wp.float64(uv[i][1])
         w = wp.float64(1.0) - u - v
@@ -66,10 +81,10 @@ def hit_kernels(precision: str) -> SimpleNamespace:
         normals: wp.array[wp.vec3d],
     ) -> None:
         i = wp.tid()
-        if prim[i] < 0:
+        face = vertices_of(faces, prim[i], vertices.shape[0])
+        if face[0] < 0:
             normals[i] = wp.vec3d(wp.float64(wp.nan))
             return
-        face = faces[prim[i]]
         v0 = in_double(vertices[face[0]])
         across = wp.cross(in_double(vertices[face[1]]) - v0, in_double(vertices[face[2]]) - v0)
         normals[i] = across / wp.length(across)

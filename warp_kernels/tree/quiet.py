@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Iterator
+from typing import Any
 
 import warp as wp
+
+from wive import _cpu
 
 
 def set_quiet() -> None:
@@ -23,3 +26,9 @@ def cpu_blocks(enabled: bool) -> Iterator[None]:
         yield
     finally:
         wp.config.enable_cpu_blocks = before
+
+
+def launch(kernel: Any, dim: Any, inputs: list[Any], outputs: list[Any], **options: Any) -> None:
+    """`wp.launch` in the core's floating-point environment, which decides how Warp's CPU device rounds."""
+    with _cpu.DefaultFloats():
+        wp.launch(kernel, dim, inputs, outputs, **options)

@@ -13,7 +13,7 @@ from wive.warp_kernels.lanes.exact_native import (
 from wive.warp_kernels.lanes.lanes import lowest_lane, product, without_gradient
 from wive.warp_kernels.lanes.layout import NO_PRIM
 from wive.warp_kernels.lanes.precision import stack_numbers
-from wive.warp_kernels.queries.frame import RayFrame, axes_of, component
+from wive.warp_kernels.queries.frame import MAX_FLOAT, RayFrame, axes_of, component
 from wive.warp_kernels.queries.query import Query
 from wive.warp_kernels.queries.query_exact import ExactBest
 
@@ -34,6 +34,7 @@ RAY_WORDS = DOUBLE_WORDS + 2 * 3
 
 SMALLEST_SHEAR = wp.constant(wp.float64(2.0**-100))
 SUBNORMAL_STEP = wp.constant(wp.float32(2.0**-148))
+LOWEST = wp.constant(wp.float32(-MAX_FLOAT))
 
 
 @wp.func
@@ -75,7 +76,7 @@ def exact_triangles(
             store(stack, DIRECTION + i, ray.given_direction[i])
         store(stack, TMIN, ray.given_tmin)
         store(stack, TMAX, ray.given_tmax)
-        store(stack, UNSCALE, 1.0 / ray.scale)
+        store(stack, UNSCALE, ray.unscale)
         inverse = wp.float64(1.0) / wp.float64(component(ray.given_direction, axes[2]))
         for i in range(2):
             shear = wp.float64(component(ray.given_direction, axes[i])) * inverse
@@ -179,8 +180,8 @@ def exact_triangles(
             best.v = hit[2]
             best.prim = prim
             best.place = place
-            # Boxes are lowered by more than t was rounded, except when t is a subnormal number.
-            best.t = product(hit[0] + SUBNORMAL_STEP, load(stack, UNSCALE))
+            # Boxes are lowered by more than t was rounded, unless t is a subnormal number or minus infinity.
+            best.t = product(wp.max(hit[0], LOWEST) + SUBNORMAL_STEP, load(stack, UNSCALE))
         return best
 
     @without_gradient

@@ -5,6 +5,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
+from wive import _cpu
 from wive._internal.room import expect_room
 
 Precision = Literal["float32", "float64"]
@@ -31,7 +32,8 @@ class Real:
         if values.dtype is self.dtype and values.flags.c_contiguous and values.flags.aligned:
             return values
         expect_room(values.size, self.dtype)
-        with np.errstate(over="ignore"):
+        # The caller's floating-point environment would round otherwise.
+        with _cpu.DefaultFloats(), np.errstate(over="ignore"):
             return np.require(values, self.dtype, ["C", "A"])
 
     def taken(self, name: str, given: ArrayLike, values: NDArray[Any]) -> Floats:
@@ -87,7 +89,7 @@ def refuse_rounded(name: str, given: ArrayLike, values: NDArray[Any], rounded: F
     """
     # NumPy gives the numbers of lists and tables one dtype, which may round integers.
     exact = values if isinstance(given, np.ndarray) else np.asarray(given, object).reshape(values.shape)
-    with np.errstate(over="ignore", invalid="ignore"):
+    with _cpu.DefaultFloats(), np.errstate(over="ignore", invalid="ignore"):
         # Compared in the dtype of the values: comparing int64 to float32 would round once more.
         kept = (rounded.astype(exact.dtype) == exact) | np.isnan(rounded)
     if exact.dtype.kind in "iu":
