@@ -215,6 +215,7 @@ PYBIND11_MODULE(_cpu, m, pybind11::mod_gil_not_used()) {
                                })
         .def_property_readonly("bounds",
                                [](const PyBvh& self) -> py::array {
+                                   const DefaultFloats floats;  // for the conversion to float32
                                    py::array_t<double> bounds({2, 3}, self.bvh().bounds()[0].data());
                                    if (self.bvh().precision() == Precision::float64) return bounds;
                                    return py::array_t<float>(bounds);

@@ -64,7 +64,7 @@ def test_hits_do_not_depend_on_the_length_of_directions(
 def test_no_direction_enters_an_empty_lane(backend: str, dtype: Any, nodes: Any) -> None:
     """Few triangles leave most lanes of the root empty; from far away every distance is as large as it gets."""
     least, most = np.finfo(dtype).smallest_subnormal, np.finfo(dtype).max
-    parts = np.array([0, -0.0, least, -least, 1, -1, most, -most], dtype)
+    parts = np.array([0.0, -0.0, least, -least, 1, -1, most, -most], dtype)
     directions = np.stack(np.meshgrid(parts, parts, parts), -1).reshape(-1, 3)
     # Across the box test's range of components that count as parallel.
     longest = np.abs(directions).max(axis=1) > 0
