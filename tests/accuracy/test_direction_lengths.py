@@ -62,7 +62,7 @@ def test_hits_do_not_depend_on_the_length_of_directions(
 @pytest.mark.parametrize("nodes", ["float32", "compressed"])
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
 def test_no_direction_enters_an_empty_lane(backend: str, dtype: Any, nodes: Any) -> None:
-    """Few triangles leave most lanes of the root empty; from far away every distance is as large as it gets."""
+    """Few triangles leave most lanes of the root empty; from far away distances are as large as they get."""
     least, most = np.finfo(dtype).smallest_subnormal, np.finfo(dtype).max
     parts = np.array([0.0, -0.0, least, -least, 1, -1, most, -most], dtype)
     directions = np.stack(np.meshgrid(parts, parts, parts), -1).reshape(-1, 3)

@@ -82,7 +82,8 @@ for dtype, accuracy in ((np.float32, "watertight"), (np.float32, "exact"), (np.f
         o, d = random.random((5000, 3)).astype(dtype), random.standard_normal((5000, 3)).astype(dtype)
         low, high = np.zeros(5000, dtype), np.full(5000, np.inf, dtype)
         def work():
-            scene.intersect(o, d, low, high); scene.occluded(o, d); scene.count(o, d); scene.intersect_all(o, d)
+            scene.intersect(o, d, low, high); scene.occluded(o, d)
+            scene.count(o, d); scene.intersect_all(o, d)
         meanwhile(work, (o, o.copy()), (d, d.copy()), seconds=0.3)
 """,
     "shaded": """
@@ -104,17 +105,20 @@ meanwhile(lambda: wive.render(scene, camera, width=64, height=64, spp=2), (v, v.
 }
 
 
-@pytest.mark.parametrize("name", CASES)
-def test_a_mesh_whose_arrays_change_never_harms_while(name: str, tmp_path: Path) -> None:
-    code = SETUP + CASES[name]
+def run(code: str, folder: Path) -> None:
     done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, timeout=120, cwd=tmp_path
+        [sys.executable, "-c", code], capture_output=True, text=True, timeout=120, cwd=folder
     )
     assert done.returncode == 0, done.stderr[-2000:]
 
 
+@pytest.mark.parametrize("name", CASES)
+def test_a_mesh_whose_arrays_change_never_harms_while(name: str, tmp_path: Path) -> None:
+    run(SETUP + CASES[name], tmp_path)
+
+
 def test_a_compressed_scene_is_built_while_its_vertices_move(tmp_path: Path) -> None:
-    """Vertices that are equal at one moment and differ at the next: blocks take the memory that was planned."""
+    """Vertices are equal at one moment and differ at the next: blocks take the memory that was planned."""
     code = (
         SETUP
         + """
@@ -132,7 +136,4 @@ ending = True
 thread.join()
 """
     )
-    done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, timeout=120, cwd=tmp_path
-    )
-    assert done.returncode == 0, done.stderr[-2000:]
+    run(code, tmp_path)

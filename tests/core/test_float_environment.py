@@ -26,7 +26,8 @@ def mxcsr(flags=None):
         assert libm.fesetenv(state) == 0
     return word.value & 0xffc0
 
-ENVIRONMENTS = {"down": 0x2000, "up": 0x4000, "toward zero": 0x6000, "flushed to zero": 0x8040, "trapping": -0x0680}
+ENVIRONMENTS = {"down": 0x2000, "up": 0x4000, "toward zero": 0x6000, "flushed to zero": 0x8040,
+                "trapping": -0x0680}
 
 random = np.random.default_rng(1)
 corners = random.random((150, 1, 3)) + 0.3 * random.standard_normal((150, 3, 3))

@@ -1,5 +1,7 @@
 """quality="high" makes a better tree over the same triangles, and gives the same hits."""
 
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -89,3 +91,16 @@ def test_a_saved_scene_keeps_its_quality(tmp_path: Path) -> None:
 def test_an_unknown_quality_is_refused() -> None:
     with pytest.raises(ValueError, match="quality must be one of medium, high"):
         wive.Scene(*sphere(1), quality="low")
+
+
+def test_the_search_is_bounded_among_long_triangles(tmp_path: Path) -> None:
+    """Long boxes overlap everywhere and bound no search: it would take the square of their number."""
+    code = """
+import numpy as np
+from wive import _cpu
+random, n = np.random.default_rng(8), 150_000
+short = random.random((n, 3, 3)) * 0.001 + random.random((n, 1, 3))
+corners = np.concatenate([short, (random.random((n, 3, 3)) - 0.5) * 10 + 0.5]).astype(np.float32)
+_cpu.Bvh(corners.reshape(-1, 3), np.arange(6 * n, dtype=np.int32).reshape(-1, 3), quality="high")
+"""
+    subprocess.run([sys.executable, "-c", code], check=True, timeout=60, cwd=tmp_path)
