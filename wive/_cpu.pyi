@@ -38,6 +38,7 @@ def available_memory(root: str = "") -> int:
 
 def expect_memory(bytes: int) -> None:
     """Raise MemoryError unless as many bytes are available; amounts under 64 MiB are not checked."""
+
 class DefaultFloats:
     """A `with` block in which this thread rounds to nearest, keeps subnormals and has no traps.
 
