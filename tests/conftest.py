@@ -64,6 +64,14 @@ def backend(request: pytest.FixtureRequest) -> str:
     return name
 
 
+@pytest.fixture
+def cpu_backend(backend: str) -> str:
+    """The name of each backend in turn but Warp, whose answers tests/warp compares with theirs."""
+    if backend == "warp":
+        pytest.skip("warp: compared in tests/warp")
+    return backend
+
+
 @pytest.fixture(scope="session")
 def device(pytestconfig: pytest.Config) -> str:
     """The Warp device that tests run on; skips if Warp can't be used."""

@@ -167,6 +167,7 @@ class Bvh:
         threads: int = 0,
         in_flight: int = 0,
         stats: bool = False,
+        touching: bool = False,
         max_bytes: int = 0,
     ) -> tuple[
         NDArray[np.int64],
@@ -190,8 +191,9 @@ class Bvh:
         threads: int = 0,
         in_flight: int = 0,
         stats: bool = False,
+        touching: bool = False,
     ) -> tuple[NDArray[np.int32], NDArray[np.int32] | None]:
-        """How many triangles each ray meets in [tmin, tmax]: (n,) int32, and stats (n,3) or None."""
+        """How many hits each ray has in [tmin, tmax]: (n,) int32, and stats (n,3) or None."""
     def render_rows(
         self,
         kernel: Kernels | str,

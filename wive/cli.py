@@ -130,6 +130,11 @@ def _add_trace(subparsers: "argparse._SubParsersAction[_Parser]") -> None:
         help=f"with --all: what the hits of {commands.BATCH_RAYS:,} rays may take; "
         "default: three quarters of the memory that is available",
     )
+    parser.add_argument(
+        "--touching",
+        action="store_true",
+        help="with --all: every triangle touched at an edge or a vertex, not every crossing of the surface",
+    )
     _add_scene_options(parser)
     _add_precision(parser)
     parser.set_defaults(run=commands.trace_rays)

@@ -26,7 +26,7 @@ from wive.meshfile import MeshSource, load_mesh
 if TYPE_CHECKING:
     from typing_extensions import Unpack
 
-    from wive._internal.arguments import Counted, CountedAll, Given, Plain, PlainAll
+    from wive._internal.arguments import Counted, CountedAll, CountedCount, Given, Plain, PlainAll, PlainCount
     from wive.warp_kernels import Tree
 
 Answer = TypeVar("Answer")
@@ -198,14 +198,21 @@ class Scene:
         in_flight: int | None = None,
         lanes: LanesOption = "auto",
         stats: bool = False,
+        touching: bool = False,
         max_bytes: int | None = None,
     ) -> AllHits | tuple[AllHits, Stats]:
-        """Every triangle that each ray meets with tmin <= t <= tmax, each once, however many there are.
+        """Every crossing of each ray with the surface at tmin <= t <= tmax, however many there are.
 
-        Arguments are those of `intersect`. Each ray's hits are sorted by ascending t, at equal t by ascending
-        prim; the first is what `intersect` returns. A ray through an edge or a vertex meets every triangle
-        there. Accuracy "exact" differs: there a ray passes a closed surface as often as one beside the edge,
-        so that parity is always right, and a hit of `intersect` that only touches an edge may be missing.
+        A ray through an edge or a vertex crosses a closed surface as often as a ray beside it: once if it
+        passes into the solid or out of it. Parity is always right, except in accuracy "fast". A ray that only
+        touches an edge or a vertex, and one through the border of an open surface, may have no hit here,
+        though `intersect` reports one.
+
+        Arguments are those of `intersect`, and:
+            touching: every triangle that the ray touches instead, all of those at an edge or a vertex, so
+                that the first is what `intersect` returns. Accuracy "fast" does this always.
+
+        Each ray's hits are sorted by ascending t, at equal t by ascending prim.
 
         CPU backends trace once; a hit takes 24 bytes until all are found, then 16 (in float64 40, then 28).
         Warp traces twice, to count and to fill, and waits for the device in between: CUDA graphs can't
@@ -225,16 +232,27 @@ class Scene:
             in_flight,
             lanes,
             stats,
+            touching,
             max_bytes,
         )
 
     @overload
     def count(
-        self, origins: Given, directions: Given, tmin: Given = 0, tmax: Given = np.inf, **how: Unpack[Plain]
+        self,
+        origins: Given,
+        directions: Given,
+        tmin: Given = 0,
+        tmax: Given = np.inf,
+        **how: Unpack[PlainCount],
     ) -> NDArray[np.int32]: ...
     @overload
     def count(
-        self, origins: Given, directions: Given, tmin: Given = 0, tmax: Given = np.inf, **how: Unpack[Counted]
+        self,
+        origins: Given,
+        directions: Given,
+        tmin: Given = 0,
+        tmax: Given = np.inf,
+        **how: Unpack[CountedCount],
     ) -> tuple[NDArray[np.int32], Stats]: ...
     def count(
         self,
@@ -247,10 +265,11 @@ class Scene:
         in_flight: int | None = None,
         lanes: LanesOption = "auto",
         stats: bool = False,
+        touching: bool = False,
     ) -> NDArray[np.int32] | tuple[NDArray[np.int32], Stats]:
-        """(n,) int32: how many hits `intersect_all` finds for each ray; arguments as for `intersect`."""
+        """(n,) int32: how many hits `intersect_all` finds for each ray; arguments are the same."""
         return self._query(
-            self._tracer.count, (origins, directions, tmin, tmax), threads, in_flight, lanes, stats
+            self._tracer.count, (origins, directions, tmin, tmax), threads, in_flight, lanes, stats, touching
         )
 
     def refit(self, vertices: ArrayLike) -> None:
@@ -358,16 +377,18 @@ class Scene:
         in_flight: int | None,
         lanes: LanesOption,
         stats: bool,
+        touching: bool = False,
         max_bytes: int | None = None,
     ) -> Answer | tuple[Answer, Stats]:
         """Check a query's arguments; its answer, with the counters if `stats`."""
         tracer = self._tracer
         checked = check_rays(*rays, tracer.backend, tracer.device)
-        usual = threads is None and in_flight is None and stats is False and max_bytes is None
-        if usual and type(lanes) is str and lanes == "auto":
+        usual = threads is None and in_flight is None and stats is False and touching is False
+        if usual and max_bytes is None and type(lanes) is str and lanes == "auto":
             work = USUAL_WORK
         else:
-            work = arguments.work(tracer.backend, tracer.lacks, threads, in_flight, lanes, stats, max_bytes)
+            options = threads, in_flight, lanes, stats, touching, max_bytes
+            work = arguments.work(tracer.backend, tracer.lacks, *options)
         answer, counters = query(checked, work)
         return answer if counters is None else (answer, counters)
 

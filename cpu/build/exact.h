@@ -2,7 +2,9 @@
 // a cheap filter is in doubt.
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstddef>
 
 #include "core/error_free.h"
@@ -31,11 +33,17 @@ int sign_of_sum(const std::array<double, count>& terms) {
 }
 
 // The exact sign of the area of (a, b, c) in the plane. A product of two floats is exact in double. A product of
-// doubles is the sum of two doubles unless it underflows: coordinates must be zero or above 1e-130.
+// doubles is the sum of two doubles unless it underflows: if all coordinates are small they are scaled up; otherwise
+// they must be zero or above 1e-130.
 inline int orientation(const double a[2], const double b[2], const double c[2]) {
+    double size = 0, scale = 1;
+    for (const double* p : {a, b, c}) size = std::max({size, std::abs(p[0]), std::abs(p[1])});
+    for (; size > 0 && size < 0x1p-300; size *= 0x1p300) scale *= 0x1p300;
     std::array<double, 12> terms{};
     std::size_t count = 0;
     const auto add_product = [&](double x, double y) {  // the rounded product and its rounding error
+        x *= scale;
+        y *= scale;
         terms[count] = x * y;
         terms[count + 1] = rounded_off_product(x, y, terms[count]);
         count += 2;

@@ -28,6 +28,7 @@ struct HitBatch {
     bool* occluded = nullptr;        // (n,) the only output of any-hit queries
     std::int32_t* stats = nullptr;   // (n, 3) inner nodes visited, leaves visited, triangles tested
     std::int32_t* count = nullptr;   // (n,) number of hits, for count and all-hits queries
+    bool crossings = true;           // count and all-hits queries: not every triangle touched, see concepts.h
     HitList<Real>* found = nullptr;  // all-hits queries: one list per worker thread of the batch
 };
 

@@ -43,8 +43,8 @@ void sort_rows(const SortedHits<Real>& hits, std::size_t begin, std::size_t end,
 
 template <class Real>
 HitCollector<Real>::HitCollector(const KernelTable<Real>& table, TraceBatch<Real> kernel, const BvhView& bvh,
-                                 const RayBatch<Real>& rays, std::size_t count, std::int32_t* stats, unsigned threads,
-                                 unsigned in_flight, std::size_t max_bytes)
+                                 const RayBatch<Real>& rays, std::size_t count, bool crossings, std::int32_t* stats,
+                                 unsigned threads, unsigned in_flight, std::size_t max_bytes)
     : threads_(thread_count(threads)),
       budget_(sizeof(FoundHit<Real>), max_bytes),
       counts_(count),
@@ -53,6 +53,7 @@ HitCollector<Real>::HitCollector(const KernelTable<Real>& table, TraceBatch<Real
     HitBatch<Real> hits;
     hits.count = counts_.data();
     hits.found = lists_.data();
+    hits.crossings = crossings;
     hits.stats = stats;
     trace(table, kernel, bvh, rays, hits, count, threads, in_flight);
     budget_.expect_within(std::accumulate(counts_.data(), counts_.data() + count, std::size_t{0}));

@@ -24,10 +24,11 @@ struct SortedHits {
 template <class Real>
 class HitCollector {
 public:
-    // Traces rays [0, count) of the batch with a kernel for QueryKind::all. stats: (n, 3), or null. max_bytes: what the
-    // hits may take here, 0 by what memory there is; more is an OutOfMemory while they are found.
+    // Traces rays [0, count) of the batch with a kernel for QueryKind::all. crossings: see HitBatch. stats: (n, 3), or
+    // null. max_bytes: what the hits may take here, 0 by what memory there is; more is an OutOfMemory while they are
+    // found.
     HitCollector(const KernelTable<Real>& table, TraceBatch<Real> kernel, const BvhView& bvh,
-                 const RayBatch<Real>& rays, std::size_t count, std::int32_t* stats, unsigned threads,
+                 const RayBatch<Real>& rays, std::size_t count, bool crossings, std::int32_t* stats, unsigned threads,
                  unsigned in_flight, std::size_t max_bytes);
 
     // Writes (count + 1,) offsets: where each ray's hits begin and the last one's end.

@@ -32,6 +32,7 @@ struct QueryCall {
     py::ssize_t count;
     unsigned threads, in_flight;
     bool stats;
+    bool touching = false;      // of several hits: every triangle touched, not every crossing
     std::size_t max_bytes = 0;  // intersect_all: what hits may take
 
     std::size_t size() const { return static_cast<std::size_t>(count); }
@@ -101,6 +102,7 @@ py::tuple count(const QueryCall<Real>& call) {
     StepCounts steps(call);
     HitBatch<Real> hits;
     hits.count = counts.mutable_data();
+    hits.crossings = !call.touching;
     hits.stats = steps.data();
     trace_released(call, QueryKind::count, hits);
     return py::make_tuple(std::move(counts), steps.take());
@@ -118,8 +120,8 @@ py::tuple intersect_all(const QueryCall<Real>& call) {
     std::optional<HitCollector<Real>> collector;
     {
         const Released released;
-        collector.emplace(call.kernels, kernel, bvh, call.rays, call.size(), steps_data, call.threads, call.in_flight,
-                          call.max_bytes);
+        collector.emplace(call.kernels, kernel, bvh, call.rays, call.size(), !call.touching, steps_data, call.threads,
+                          call.in_flight, call.max_bytes);
         collector->write_offsets(offsets_data);
     }
     const auto total = static_cast<py::ssize_t>(offsets_data[call.count]);
@@ -134,7 +136,7 @@ py::tuple intersect_all(const QueryCall<Real>& call) {
     return py::make_tuple(std::move(offsets), std::move(t), std::move(prim), std::move(uv), steps.take());
 }
 
-// More: the types of the arguments that only this query has, the last of QueryCall; arg: their names and defaults.
+// More: the types of the arguments that not every query has, the last of QueryCall; arg: their names and defaults.
 template <class Real, class... More, class... Arg>
 void define_query(PyBvhClass& bvh, const char* name, py::tuple (*query)(const QueryCall<Real>&), const Arg&... arg) {
     static_assert(sizeof...(More) == sizeof...(Arg));
@@ -155,8 +157,9 @@ void bind_queries(PyBvhClass& bvh) {
     for_each_precision([&]<class Real>(Real) {
         define_query<Real>(bvh, "intersect", intersect);
         define_query<Real>(bvh, "occluded", occluded);
-        define_query<Real, std::size_t>(bvh, "intersect_all", intersect_all, py::arg("max_bytes") = 0);
-        define_query<Real>(bvh, "count", count);
+        define_query<Real, bool, std::size_t>(bvh, "intersect_all", intersect_all, py::arg("touching") = false,
+                                              py::arg("max_bytes") = 0);
+        define_query<Real, bool>(bvh, "count", count, py::arg("touching") = false);
     });
 }
 

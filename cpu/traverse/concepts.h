@@ -140,9 +140,9 @@ concept RayQuery = std::same_as<decltype(Q::interval), Interval<Real>> &&  // in
                        typename Q::InFlight;  // the variant of the query for rays in flight
                        // Whether children are visited front to back, because the interval shrinks with every hit.
                        { Q::in_order } -> std::convertible_to<bool>;
-                       // Whether the number of hits matters: exact tests then perturb edges, so that a ray through
-                       // an edge or a vertex crosses a closed surface once.
-                       { Q::perturb_edges } -> std::convertible_to<bool>;
+                       // Whether hits are crossings: a ray through an edge or a vertex of a closed surface hits it as
+                       // often as a ray beside it. Otherwise triangles are closed. `fast` ignores it.
+                       { query.crossings } -> std::convertible_to<bool>;
                        query.write(hits, i, unscale);  // writes the result of ray i; unscale: see RayFrame
                    };
 

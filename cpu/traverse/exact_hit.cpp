@@ -1,7 +1,5 @@
 #include "traverse/exact_hit.h"
 
-#include <cmath>
-
 namespace wive {
 namespace {
 
@@ -14,16 +12,11 @@ ExactIntersection intersect(const CallerRay& ray, const TriangleCorners& corners
 
 }  // namespace
 
-bool hits_exactly(const CallerRay& ray, const TriangleCorners& corners, bool perturb_edges, RoundedHit& hit) {
+bool hits_exactly(const CallerRay& ray, const TriangleCorners& corners, bool crossings, RoundedHit& hit) {
     const ExactIntersection found = intersect(ray, corners);
-    if (!(perturb_edges ? found.hit_perturbed : found.hit)) return false;
+    if (!(crossings ? found.hit_perturbed : found.hit)) return false;
     hit = {found.t(), found.u(), found.v()};
     return true;
-}
-
-int compare_with_limit(const CallerRay& ray, const TriangleCorners& corners, float limit) {
-    if (std::isinf(limit)) return limit > 0 ? -1 : 1;
-    return intersect(ray, corners).compare(limit);
 }
 
 int compare_distances(const CallerRay& ray, const TriangleCorners& one, const TriangleCorners& other) {

@@ -13,17 +13,14 @@ struct TriangleCorners {
     float v[9];  // three times x, y, z
 };
 
-// t, u and v of a hit, each the float nearest to the exact value.
+// t, u and v of a hit, each the float nearest to the exact value; a negative t that rounds to zero is -0.
 struct RoundedHit {
     float t, u, v;
 };
 
-// Whether the ray's line hits the closed triangle; fills in `hit` if it does. With perturb_edges, a line that meets an
+// Whether the ray's line hits the closed triangle; fills in `hit` if it does. With crossings, a line that meets an
 // edge or a vertex of a closed surface hits it exactly as often as a line beside it does (docs/accuracy.md).
-bool hits_exactly(const CallerRay& ray, const TriangleCorners& corners, bool perturb_edges, RoundedHit& hit);
-
-// The sign of t - limit for a triangle that the line hits.
-int compare_with_limit(const CallerRay& ray, const TriangleCorners& corners, float limit);
+bool hits_exactly(const CallerRay& ray, const TriangleCorners& corners, bool crossings, RoundedHit& hit);
 
 // The sign of the difference between the t of two triangles that the line hits.
 int compare_distances(const CallerRay& ray, const TriangleCorners& one, const TriangleCorners& other);

@@ -13,6 +13,7 @@
 #include "core/layout.h"
 #include "core/ray.h"
 #include "traverse/concepts.h"
+#include "traverse/scaled_limits.h"
 
 namespace wive::WIVE_ISA {
 
@@ -93,7 +94,14 @@ struct RayFrame {
             scaled_direction = caller_direction / Real4::all(unscale);
             scaled_longest = longest / unscale;
         }
-        interval = Interval<Real>::of(caller_tmin * unscale, caller_tmax * unscale);
+        const Real near = caller_tmin * unscale, far = caller_tmax * unscale;
+        interval = Interval<Real>::of(near, far);
+        // Limits are compared with t as it is returned. Scaling is exact if nothing is infinite or nearly subnormal.
+        constexpr Real least = 2 * std::numeric_limits<Real>::min(), most = std::numeric_limits<Real>::max();
+        const bool exact = ((caller_tmin == 0) | ((caller_tmin >= least) & (near >= least) & (near <= most))) &
+                           (caller_tmax >= least) & (far >= least);
+        if (!exact) [[unlikely]]
+            interval = scaled_limits(caller_tmin, caller_tmax, unscale);
 
         constexpr float smallest_part = 0x1p-30f, slack_factor = 0x1p-20f;
         constexpr float least_magnitude = 0x1p-100f;             // keeps the slack from vanishing if everything is tiny
@@ -123,7 +131,7 @@ struct RayFrame {
     // What load() guarantees when it returns true; asserted when traversal begins.
     [[gnu::always_inline]] bool is_finite() const {
         constexpr float most_rdir = 0x1p30f, most_bias = 0x1p93f;
-        bool finite = interval.tmin <= interval.tmax;
+        bool finite = interval.tmin == interval.tmin && interval.tmax == interval.tmax;
         for (int axis = 0; axis < 3; ++axis)
             finite = finite && __builtin_isfinite(origin[axis]) && __builtin_isfinite(direction[axis]) &&
                      __builtin_fabsf(rdir[axis]) <= most_rdir && __builtin_fabsf(near_bias[axis]) <= most_bias &&

@@ -44,7 +44,7 @@ template <class Real, bool in_flight = false>
 struct ClosestHit {
     using InFlight = ClosestHit<Real, true>;
     static constexpr bool in_order = true;
-    static constexpr bool perturb_edges = false;
+    static constexpr bool crossings = false;
 
     Interval<Real> interval;  // ends at the best hit
     HitWords<Real> best;
@@ -78,7 +78,7 @@ template <class Real>
 struct AnyHit {
     using InFlight = AnyHit;
     static constexpr bool in_order = false;  // cheaper, and fewer steps: the builder puts likely occluders last
-    static constexpr bool perturb_edges = false;
+    static constexpr bool crossings = false;
 
     Interval<Real> interval{};
     bool hit = false;

@@ -7,14 +7,14 @@
 
 namespace wive::WIVE_ISA {
 
-// The number of triangles hit in [tmin, tmax].
+// The number of hits in [tmin, tmax]. crossings: see RayQuery in concepts.h.
 template <class Real>
 struct CountHits {
     using InFlight = CountHits;
     static constexpr bool in_order = false;  // every hit is wanted, and none ends the interval
-    static constexpr bool perturb_edges = true;
 
     Interval<Real> interval{};
+    bool crossings = true;
     std::int32_t count = 0;
 
     [[gnu::always_inline]] bool offer(Real t, Real, Real, std::uint32_t) {
@@ -35,9 +35,9 @@ template <class Real>
 struct AllHits {
     using InFlight = AllHits;
     static constexpr bool in_order = false;
-    static constexpr bool perturb_edges = true;
 
     Interval<Real> interval{};
+    bool crossings = true;
     Real unscale = 1;  // as RayFrame has it
     std::int32_t count = 0;
     std::size_t ray = 0;

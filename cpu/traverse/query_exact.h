@@ -13,7 +13,7 @@ template <class Block>
 struct ExactClosestHit {
     using InFlight = ExactClosestHit;
     static constexpr bool in_order = true;
-    static constexpr bool perturb_edges = false;
+    static constexpr bool crossings = false;
     static constexpr bool wants_uv = true;
     static constexpr float lowest = std::numeric_limits<float>::lowest();
 

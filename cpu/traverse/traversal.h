@@ -220,12 +220,18 @@ template <class Layout>
         __builtin_prefetch(reinterpret_cast<const void*>(address + 64 * line));
 }
 
-// AllHits alone records whose hits they are, in the caller's units.
+// Queries of several hits know which they take; AllHits alone records whose hits they are, in the caller's units.
 template <class Query, Isa I>
 [[gnu::always_inline]] inline Query start_query(const RayFrame<I>& ray, const HitBatch<typename I::Real>& hits,
                                                 std::size_t i) {
     if constexpr (requires { &Query::found; })
-        return {.interval = ray.interval, .unscale = ray.unscale, .ray = i, .found = hits.found};
+        return {.interval = ray.interval,
+                .crossings = hits.crossings,
+                .unscale = ray.unscale,
+                .ray = i,
+                .found = hits.found};
+    else if constexpr (requires { &Query::count; })
+        return {.interval = ray.interval, .crossings = hits.crossings};
     else
         return {ray.interval};
 }

@@ -4,6 +4,7 @@
 
 #include <cassert>
 #include <cmath>
+#include <limits>
 
 #include "core/layout.h"
 #include "traverse/exact_hit.h"
@@ -39,6 +40,11 @@ struct ExactFrame : AxisFrame<I> {
         const float* d = caller_direction;
         for (int k = 0; k < 3; ++k) from[k] = caller_origin[axis[k]];
         inverse = 1.0 / d[axis[2]];
+        // A t may have been rounded into the interval; the slack of the boxes covers that unless t is subnormal or
+        // infinite.
+        constexpr float step = 0x1p-148f, most = std::numeric_limits<float>::max();
+        const float low = caller_tmin < most ? caller_tmin : most, high = caller_tmax > -most ? caller_tmax : -most;
+        this->interval = Interval<float>::of((low - step) * this->unscale, (high + step) * this->unscale);
         shear[0] = slope(d[axis[0]] * inverse);
         shear[1] = slope(d[axis[1]] * inverse);
         // 96 e M^2, M (magnitude) no less than the distance of any corner from the origin along an axis.
@@ -127,7 +133,7 @@ public:
         if (hit_mask == 0) return false;
 
         alignas(16) float ts[4], us[4] = {}, vs[4] = {};
-        unsigned doubt = on_edge | t.store(ts);
+        unsigned doubt = on_edge | t.store(ts) | equal(t.low, Float4::all(0.0f));  // the sign of zero matters
         if constexpr (Query::wants_uv) {
             doubt |= Rounded(weight[1] * inverse_det, weight_error).store(us);
             doubt |= Rounded(weight[2] * inverse_det, weight_error).store(vs);
@@ -136,11 +142,11 @@ public:
             const int lane = __builtin_ctz(hit_mask);
             RoundedHit hit = {ts[lane], us[lane], vs[lane]};
             if (doubt >> lane & 1u) [[unlikely]] {
-                if (!hits_exactly(ray_.caller_ray(), corners_of(corners.block, lane), Query::perturb_edges, hit))
-                    continue;
+                if (!hits_exactly(ray_.caller_ray(), corners_of(corners.block, lane), query.crossings, hit)) continue;
             }
             assert(corners.block.prim_at(lane) >= 0);
-            if (!within_limits(corners.block, lane, hit.t)) continue;
+            if (!within_limits(hit.t)) continue;
+            hit.t += 0.0f;  // no -0
             if (accept(corners.block, lane, hit, query)) return true;
         }
         return false;
@@ -179,15 +185,10 @@ private:
             return ray_.caller_tmax;
     }
 
-    // Rounding preserves order, so t can have crossed a limit only if it rounds to that limit.
-    template <class Block>
-    [[gnu::always_inline]] bool within_limits(const Block& block, int lane, float t) const {
-        if (t < ray_.caller_tmin || t > ray_.caller_tmax) return false;
-        if (t == ray_.caller_tmin) [[unlikely]]
-            if (compare_with_limit(ray_.caller_ray(), corners_of(block, lane), t) < 0) return false;
-        if (t == ray_.caller_tmax) [[unlikely]]
-            if (compare_with_limit(ray_.caller_ray(), corners_of(block, lane), t) > 0) return false;
-        return true;
+    // Limits are compared with the rounded t. -0 is that of a hit behind the origin.
+    [[gnu::always_inline]] bool within_limits(float t) const {
+        const bool behind = t == 0 && __builtin_signbit(t) && ray_.caller_tmin == 0;
+        return t >= ray_.caller_tmin && t <= ray_.caller_tmax && !behind;
     }
 
     template <class Block, class Query>

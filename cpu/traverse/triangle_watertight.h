@@ -11,6 +11,7 @@
 #include <cmath>
 
 #include "core/layout.h"
+#include "traverse/crossings.h"
 #include "traverse/frame.h"
 #include "traverse/query.h"
 #include "traverse/triangle_watertight_float64.h"
@@ -83,14 +84,14 @@ public:
         if constexpr (precision_of<Real> == Precision::float64) {
             const Sheared<Corners> sheared(*this, corners);
             Float64Hits<I> hits;
-            const unsigned hit_mask =
-                hits.solve(found.hit_mask, sheared.x, sheared.y, sheared.z, sheared.weight, ray_.direction[axis_[2]]);
+            const unsigned hit_mask = hits.solve(found.hit_mask, sheared.x, sheared.y, sheared.z, sheared.weight,
+                                                 ray_.direction[axis_[2]], query.crossings);
             return offer_lanes(corners.block, hit_mask, hits.t, hits.u, hits.v, query);
         } else {
             unsigned hit_mask = found.hit_mask;
             Float4 side = found.side;
             if (const unsigned zero_edges = hit_mask & found.zero_edges; zero_edges != 0) [[unlikely]]
-                hit_mask = resolve_zero_edges(corners.block, hit_mask, zero_edges, side);
+                hit_mask = resolve_zero_edges(corners.block, hit_mask, zero_edges, query.crossings, side);
             alignas(16) float ts[4], us[4], vs[4];
             intersect(corners, hit_mask, side, ts, us, vs);
             return offer_lanes(corners.block, hit_mask, ts, us, vs, query);
@@ -152,17 +153,15 @@ private:
     // Decides the lanes with an edge function of zero by exact signs; returns the hit mask and corrects `side`.
     template <class Block>
     [[gnu::noinline]] unsigned resolve_zero_edges(const Block& block, unsigned hit_mask, unsigned zero_edges,
-                                                  Float4& side) const {
+                                                  bool crossings, Float4& side) const {
         alignas(16) float sides[4];
         side.store(sides);
         for (; zero_edges != 0; zero_edges &= zero_edges - 1) {
             const int lane = __builtin_ctz(zero_edges);
-            double edges[3], z[3];
-            exact_edges(block, lane, edges, z);
-            const bool negative = edges[0] < 0 || edges[1] < 0 || edges[2] < 0;
-            const bool positive = edges[0] > 0 || edges[1] > 0 || edges[2] > 0;
-            if (negative == positive) hit_mask &= ~(1u << lane);  // the ray passes outside, or the triangle is edge-on
-            sides[lane] = negative ? -1.0f : 1.0f;
+            const RoundedTriangle rounded = round_corners(block, lane);
+            const int passed = side_passed(rounded.x, rounded.y, rounded.edge, crossings);
+            if (passed == 0) hit_mask &= ~(1u << lane);
+            sides[lane] = static_cast<float>(passed);
         }
         side = Float4::load(sides);
         return hit_mask;
@@ -174,8 +173,7 @@ private:
                                              float (&vs)[4]) const {
         for (; hit_mask != 0; hit_mask &= hit_mask - 1) {
             const int lane = __builtin_ctz(hit_mask);
-            double weight[3], z[3];
-            exact_edges(block, lane, weight, z);
+            const auto [x, y, z, weight] = round_corners(block, lane);
             const double det = weight[0] + weight[1] + weight[2];
             const double height = weight[0] * z[0] + weight[1] * z[1] + weight[2] * z[2];
             ts[lane] = static_cast<float>(height / (det * ray_.direction[axis_[2]]));
@@ -184,10 +182,14 @@ private:
         }
     }
 
-    // Computes the edge functions of one lane's rounded corners, with exact signs, and the corners' depths.
+    // One lane's rounded corners and edge functions, which have the exact sign.
+    struct RoundedTriangle {
+        double x[3], y[3], z[3], edge[3];
+    };
     template <class Block>
-    [[gnu::noinline]] void exact_edges(const Block& block, int lane, double (&edges)[3], double (&depth)[3]) const {
-        double x[3], y[3];
+    [[gnu::noinline]] RoundedTriangle round_corners(const Block& block, int lane) const {
+        RoundedTriangle rounded;
+        auto& [x, y, depth, edge] = rounded;
         for (int k = 0; k < 3; ++k) {
             const auto away = [&](std::size_t i) {
                 return block.vertex(k, static_cast<int>(axis_[i]), lane) - ray_.origin[axis_[i]];
@@ -200,8 +202,9 @@ private:
         }
         for (int k = 0; k < 3; ++k) {
             const int i = (k + 2) % 3, j = (k + 1) % 3;
-            edges[k] = x[i] * y[j] - y[i] * x[j];
+            edge[k] = x[i] * y[j] - y[i] * x[j];
         }
+        return rounded;
     }
 
     const Frame& ray_;

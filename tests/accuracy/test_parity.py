@@ -1,8 +1,10 @@
-"""Parity in exact mode against manifold3d, which casts rays by rules of its own and shares no code with wive.
+"""Parity against manifold3d, which casts rays by rules of its own and shares no code with wive.
 
 Its `ray_cast` also keeps parity at vertices and edges, so all kinds of rays are compared. It works in double
 and rounds end points, so only parity is compared, not each hit.
 """
+
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -14,6 +16,11 @@ import wive
 
 manifold3d = pytest.importorskip("manifold3d", reason="manifold3d casts rays for comparison")
 Mesh = tuple[np.ndarray, np.ndarray]
+KINDS: list[tuple[Literal["watertight", "exact"], type]] = [
+    ("exact", np.float32),
+    ("watertight", np.float32),
+    ("watertight", np.float64),
+]
 
 MESHES = {
     "tetrahedron": TETRAHEDRON,
@@ -67,7 +74,11 @@ def check(
 ) -> None:
     for backend in backends:
         if backend == "warp":
-            continue  # test_exact_crossings.py compares the other backends' counts
+            continue  # test_crossings.py and test_exact_crossings.py compare the other backends' counts
         for nodes in ("float32", "compressed"):
-            scene = wive.Scene(*mesh, backend=backend, accuracy="exact", nodes=nodes)
-            np.testing.assert_array_equal(scene.count(origins, directions) % 2, right)
+            for accuracy, dtype in KINDS:
+                scene = wive.Scene(
+                    mesh[0].astype(dtype), mesh[1], backend=backend, accuracy=accuracy, nodes=nodes
+                )
+                counts = scene.count(origins.astype(dtype), directions.astype(dtype))
+                np.testing.assert_array_equal(counts % 2, right)

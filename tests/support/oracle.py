@@ -77,7 +77,7 @@ def truth(
     tmin: np.ndarray,
     tmax: np.ndarray,
 ) -> Truth:
-    """The closest hit of each ray with tmin <= t <= tmax, which are (1,) or (n,)."""
+    """The closest hit of each ray whose rounded t lies in [tmin, tmax], which are (1,) or (n,)."""
     met = meetings(vertices, faces, origins, directions)
     count = len(origins)
     tmin, tmax = np.broadcast_to(tmin, count), np.broadcast_to(tmax, count)
@@ -86,7 +86,7 @@ def truth(
     prim = np.full(count, -1, np.int32)
     for ray in range(count):
         hits = [(met.t(ray, face), int(face)) for face in np.flatnonzero(met.inside[ray])]
-        hits = [hit for hit in hits if tmin[ray] <= hit[0] <= tmax[ray]]
+        hits = [hit for hit in hits if within(hit[0], tmin[ray], tmax[ray])]
         if not hits:
             continue
         distance, face = min(hits)
@@ -94,6 +94,11 @@ def truth(
         for k in range(2):
             uv[ray, k] = nearest_float(Fraction(met.weights[ray, face, k + 1], met.determinant[ray, face]))
     return Truth(t, prim, uv, prim >= 0)
+
+
+def within(t: Fraction, tmin: float, tmax: float) -> bool:
+    """Whether t, rounded, lies in the interval; a t below zero does not lie at a tmin of zero."""
+    return bool(tmin <= nearest_float(t) <= tmax) and not (t < 0 <= tmin)
 
 
 def crossings(

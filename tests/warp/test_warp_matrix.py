@@ -54,6 +54,24 @@ def test_every_backend_gives_the_same_bits_on_real_scenes(
     assert_bit_identical(one_lane, cpu_answers(bvh, "scalar", origins[few], directions[few]))
 
 
+@pytest.mark.parametrize("accuracy", ACCURACIES)
+def test_limits_at_a_returned_t_are_compared_with_the_t_that_is_returned(accuracy: str) -> None:
+    """With directions of ordinary length, and so long or short that t under- or overflows."""
+    bvh = _cpu.Bvh(*sphere(2), accuracy)
+    origins, directions = random_rays(300, 12, -0.5, 0.5)
+    lengths = np.exp2(np.random.default_rng(13).choice([-128, -100, 0, 80, 125], (300, 1)))
+    rays = origins, (directions * lengths).astype(np.float32)
+    t = cpu_answers(bvh, "scalar", *rays).t
+    assert (t < 2.0**-126).any() and np.isinf(t).any()
+    for limits in ((t, t), (t, np.full_like(t, np.inf)), (np.zeros_like(t), t)):
+        reference = cpu_answers(bvh, "scalar", *rays, *limits)
+        assert reference.occluded.all() and (reference.t == t).all()
+        for kernel in CPU_KERNELS:
+            assert_bit_identical(cpu_answers(bvh, kernel, *rays, *limits), reference, HITS)
+        for lanes in (8, 1):
+            assert_bit_identical(warp_answers(bvh, lanes, *rays, *limits), reference)
+
+
 @pytest.mark.parametrize("nodes", FORMS)
 @pytest.mark.parametrize("accuracy", ACCURACIES)
 @pytest.mark.parametrize("count", [1, 3, 13, 101])

@@ -9,15 +9,13 @@ import warp as wp
 
 from wive.warp_kernels.lanes.lanes import without_gradient
 from wive.warp_kernels.lanes.layout import NO_PRIM
-from wive.warp_kernels.queries.frame import LOAD_FRAME
+from wive.warp_kernels.queries.frame import make_load_frame
 from wive.warp_kernels.queries.query_exact import query_of
 from wive.warp_kernels.traversal.traversal import make_traversal
 from wive.warp_kernels.tree.handle import ACCURACIES, HANDLES, STACK_TOO_SMALL, WRONG_ACCURACY, Hit
 
 # A tree of 2.7 million triangles needs less than 100; deeper trees are refused by the error flag.
 STACK_SIZE = 128
-
-load_frame = LOAD_FRAME["float32"]
 
 
 @wp.func
@@ -58,6 +56,7 @@ def make_functions(
     """
     handle_type, wanted = HANDLES[accuracy], ACCURACIES.index(accuracy)
     closest, any_, count = (query_of(name, accuracy) for name in ("closest", "any", "count"))
+    load_frame = make_load_frame(accuracy, "float32")
     begin_closest, distance = closest.begin, closest.distance
     begin_any, begin_count = any_.begin, count.begin
     trace_closest, trace_any, trace_count = (
@@ -96,7 +95,7 @@ def make_functions(
 
     @wp.func
     def count_hits(bvh: handle_type, origin: wp.vec3, direction: wp.vec3, tmin: float, tmax: float) -> int:
-        """The number of triangles hit within the closed interval [tmin, tmax], as `wive.Scene.count`.
+        """The number of hits within the closed interval [tmin, tmax], as `wive.Scene.count`.
 
         It takes the same handles as `closest_hit` and has no gradient.
         """

@@ -90,34 +90,28 @@ _SOLVE = (
             hit[3] = 0.0f;
             return hit;
         }
+        doubt = doubt || (i == 0 && below == 0.0f);  // the sign of zero matters
     }
     hit[3] = 1.0f;
-    if (!doubt) return hit;
+    if (!doubt) {
+        hit[3] = hit[0] >= tmin && hit[0] <= farthest_t ? 1.0f : 0.0f;
+        return hit;
+    }
 """
     + _SETUP
     + """
     const ExactIntersection exact(from, way, corners, ExactIntersection::unit_of(from, corners));
-    hit[3] = (perturb_edges ? exact.hit_perturbed : exact.hit) ? 1.0f : 0.0f;
-    if (hit[3] == 0.0f) return hit;
-    hit[0] = exact.t();
+    hit[3] = 0.0f;
+    if (!(crossings ? exact.hit_perturbed : exact.hit)) return hit;
+    const float t = exact.t();
+    // -0 is that of a hit behind the origin.
+    const bool behind = t == 0.0f && BigInt::bits_of(t) != 0u && tmin == 0.0f;
+    if (!(t >= tmin && t <= farthest_t) || behind) return hit;
+    hit[0] = t + 0.0f;  // no -0
     hit[1] = exact.u();
     hit[2] = exact.v();
+    hit[3] = 1.0f;
     return hit;
-"""
-)
-
-# Rounding keeps order, so the exact t can be beyond a limit that t is within only if t equals that limit. t
-# is finite; limits need not be.
-_WITHIN = (
-    """
-    if (t < tmin || t > tmax) return false;
-    const bool at_tmin = t == tmin && t - t == 0.0f, at_tmax = t == tmax && t - t == 0.0f;
-    if (!at_tmin && !at_tmax) return !(t == tmin && t > 0.0f) && !(t == tmax && t < 0.0f);
-"""
-    + _SETUP
-    + """
-    const ExactIntersection exact(from, way, corners, ExactIntersection::unit_of(from, corners));
-    return !(at_tmin && exact.compare(tmin) < 0) && !(at_tmax && exact.compare(tmax) > 0);
 """
 )
 
@@ -159,28 +153,13 @@ def solve_exactly(
     inverse: wp.float64,
     tmin: float,
     farthest_t: float,
-    perturb_edges: bool,
+    crossings: bool,
 ) -> wp.vec4:
     """t, u and v of a triangle, correctly rounded, and 1; the last is 0 if the line misses the triangle.
 
-    It is 0 also if t is certainly outside [tmin, farthest_t]. perturb_edges: a line through an edge or vertex
-    hits one of the triangles there, as if its origin were moved by an infinitely small amount.
+    It is 0 also if t, so rounded, is outside [tmin, farthest_t]. crossings: a line through an edge or vertex
+    hits triangles there as if its origin were moved by an infinitely small amount.
     """
-    ...
-
-
-@wp.func_native(_WITHIN)
-def lies_within(
-    units: wp.uint64,
-    at: wp.vec3i,
-    stride: int,
-    origin: wp.vec3,
-    direction: wp.vec3,
-    t: float,
-    tmin: float,
-    tmax: float,
-) -> bool:
-    """Whether the exact t of a triangle, which rounds to t, lies in [tmin, tmax]."""
     ...
 
 

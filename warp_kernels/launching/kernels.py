@@ -11,7 +11,7 @@ import warp as wp
 from wive.warp_kernels.lanes.lanes import collectives
 from wive.warp_kernels.lanes.layout import ALL_BITS, NO_PRIM
 from wive.warp_kernels.lanes.precision import PRECISIONS
-from wive.warp_kernels.queries.frame import FRAMES, LOAD_FRAME, box_tmax
+from wive.warp_kernels.queries.frame import FRAMES, box_tmax, make_load_frame
 from wive.warp_kernels.queries.query_exact import query_of
 from wive.warp_kernels.traversal.states import TRAVERSALS
 from wive.warp_kernels.traversal.traversal import make_traversal
@@ -53,7 +53,7 @@ def make_kernel(
     nodes: str = "float32",
     precision: str = "float32",
 ) -> wp.Kernel:
-    """The kernel of a query ("closest", "any", "count" or "all"), to be launched with dim (n, 8 // length).
+    """The kernel of a query in QUERIES, to be launched with dim (n, 8 // length).
 
     Its arguments are the tree's handle, origins, directions, tmin, tmax and the outputs of that query.
     """
@@ -63,7 +63,7 @@ def make_kernel(
     found_type, result_type = query_type.state, TRAVERSALS[query_type.state]
     traverse = make_traversal(query, accuracy, length, stack_size, counters, nodes, precision)
     or_reduce = collectives(length).or_reduce
-    load_frame = LOAD_FRAME[precision]
+    load_frame = make_load_frame(accuracy, precision)
 
     @wp.func
     def load_ray(
@@ -98,7 +98,7 @@ def make_kernel(
     )
     if query == "closest":
         return _closest_kernel(parts, numbers, query_type.distance, length, counters)
-    if query == "all":
+    if query in ("all", "all_touching"):
         return _all_kernel(parts, HITS[precision])
     return (_any_kernel if query == "any" else _count_kernel)(parts, length, counters)
 

@@ -97,16 +97,27 @@ def launch_count(
     counts: wp.array[Any],
     *,
     stats: wp.array[Any] | None = None,
+    touching: bool = False,
     lanes: Lanes = 8,
     block_dim: int | None = None,
     stream: wp.Stream | None = None,
 ) -> None:
-    """Write to counts (n,) int32 how many triangles each ray hits in its closed interval [tmin, tmax].
+    """Write to counts (n,) int32 how many hits each ray has in its closed interval [tmin, tmax].
 
-    The other arguments are those of `launch_closest`.
+    touching: count every triangle that the ray touches; otherwise a ray through an edge or a vertex of a
+    closed surface crosses it once. The other arguments are those of `launch_closest`.
     """
     rays = (origins, directions, tmin, tmax)
-    _launch("count", tree, rays, (counts, stats), lanes, block_dim, stream, counters=stats is not None)
+    _launch(
+        "count_touching" if touching else "count",
+        tree,
+        rays,
+        (counts, stats),
+        lanes,
+        block_dim,
+        stream,
+        counters=stats is not None,
+    )
 
 
 def scan_counts(counts: wp.array[Any]) -> wp.array[Any]:
@@ -133,6 +144,7 @@ def launch_all(
     prim: wp.array[Any],
     uv: wp.array[Any],
     *,
+    touching: bool = False,
     lanes: Lanes = 8,
     block_dim: int | None = None,
     stream: wp.Stream | None = None,
@@ -140,7 +152,7 @@ def launch_all(
     """Write the hits that `launch_count` counted, each ray's by ascending t, then prim.
 
     Args:
-        tree, origins, directions, tmin, tmax, lanes, block_dim, stream: as for `launch_count`.
+        tree, origins, directions, tmin, tmax, touching, lanes, block_dim, stream: as for `launch_count`.
         counts: (n,) int32 of `launch_count`; they run down to zero.
         offsets: (n+1,) int64 of `scan_counts`.
         t: (h,) float32, h the last of the offsets, at most 2^31 - 1.
@@ -149,7 +161,9 @@ def launch_all(
     """
     hits = wp.empty(len(t), dtype=HITS[tree.precision], device=tree.device)
     rays = (origins, directions, tmin, tmax)
-    _launch("all", tree, rays, (offsets, counts, hits), lanes, block_dim, stream)
+    _launch(
+        "all_touching" if touching else "all", tree, rays, (offsets, counts, hits), lanes, block_dim, stream
+    )
     launch(
         sort_kernel(tree.precision),
         len(counts),

@@ -3,16 +3,20 @@
 The operations are those of cpu/traverse/frame.h, in the same order.
 """
 
+import functools
+
 import warp as wp
 
 from wive.warp_kernels.lanes.layout import SIGN_BIT
 from wive.warp_kernels.lanes.precision import PRECISIONS
+from wive.warp_kernels.queries.limits import make_scale_limits
 
 MAX_COORDINATE = 1e18
 MAX_FLOAT = 3.4028234663852886e38
 MAX_DOUBLE = 1.7976931348623157e308
 SMALLEST_PART = wp.constant(wp.float32(2.0**-30))
 LEAST_MAGNITUDE = wp.constant(wp.float32(2.0**-100))
+SUBNORMAL_STEP = wp.constant(wp.float32(2.0**-148))
 SLACK_FACTOR = wp.constant(wp.float32(2.0**-20))
 # Make any subnormal number normal.
 NORMALISE = wp.constant(wp.float32(2.0**24))
@@ -57,6 +61,9 @@ class RayFrame64:
     octant: wp.int32
     longest_axis: wp.int32
     valid: wp.bool
+
+
+FRAMES = {"float32": RayFrame, "float64": RayFrame64}
 
 
 @wp.func
@@ -148,10 +155,13 @@ def axes_of(longest: int):
     return wp.vec3i(x, wp.where(x == 2, 0, x + 1), longest)
 
 
-def make_load_frame(precision: str, frame_type: type) -> wp.Function:
-    """The function that makes a ray of this precision ready."""
+@functools.cache
+def make_load_frame(accuracy: str, precision: str) -> wp.Function:
+    """The function that makes a ray ready for trees of this accuracy and precision."""
+    frame_type, exact = FRAMES[precision], accuracy == "exact"
     numbers = PRECISIONS[precision]
     real, vec3 = numbers.real, numbers.vec3
+    scale_limits = make_scale_limits(precision)
     double: bool = precision == "float64"
     max_coordinate = real(MAX_COORDINATE)
     max_component = real(MAX_DOUBLE if double else MAX_FLOAT)
@@ -168,8 +178,15 @@ def make_load_frame(precision: str, frame_type: type) -> wp.Function:
                 ray.valid = False
 
         ray.unscale = power_of(longest)
-        ray.tmin = tmin * ray.unscale
-        ray.tmax = tmax * ray.unscale
+        if wp.static(exact):
+            # For boxes: a t that is subnormal or infinite may have been rounded into the interval by more
+            # than their slack.
+            ray.tmin = (wp.min(tmin, max_component) - SUBNORMAL_STEP) * ray.unscale
+            ray.tmax = (wp.max(tmax, -max_component) + SUBNORMAL_STEP) * ray.unscale
+        else:
+            limits = scale_limits(tmin, tmax, ray.unscale)
+            ray.tmin = limits[0]
+            ray.tmax = limits[1]
         ray.origin = origin
         ray.direction = direction / ray.unscale
         scaled = wp.vec3()
@@ -203,7 +220,3 @@ def make_load_frame(precision: str, frame_type: type) -> wp.Function:
         return ray
 
     return load_frame
-
-
-FRAMES = {"float32": RayFrame, "float64": RayFrame64}
-LOAD_FRAME = {precision: make_load_frame(precision, frame) for precision, frame in FRAMES.items()}

@@ -23,7 +23,8 @@ class Query:
     in_order: children are visited from front to back and stored with their distances, because tmax falls with
         every hit.
     first_hit_ends: a hit of any thread ends the query.
-    perturb_edges: hits are counted, so a ray through an edge or vertex must hit one of the triangles there.
+    crossings: a ray through an edge or a vertex of a closed surface hits it as often as a ray beside it;
+        otherwise triangles are closed.
     """
 
     state: Any
@@ -32,7 +33,7 @@ class Query:
     distance: wp.Function | None = None
     in_order: bool = False
     first_hit_ends: bool = False
-    perturb_edges: bool = False
+    crossings: bool = False
 
 
 @wp.struct
@@ -130,8 +131,10 @@ def make_queries(precision: str, best_type: Any, multi_hit_type: Any) -> dict[st
     return {
         "closest": Query(best_type, begin_best, offer_closest, distance, in_order=True),
         "any": Query(best_type, begin_best, offer_any, first_hit_ends=True),
-        "count": Query(multi_hit_type, begin_multi_hit, offer_count, perturb_edges=True),
-        "all": Query(multi_hit_type, begin_multi_hit, offer_all, perturb_edges=True),
+        "count": Query(multi_hit_type, begin_multi_hit, offer_count, crossings=True),
+        "all": Query(multi_hit_type, begin_multi_hit, offer_all, crossings=True),
+        "count_touching": Query(multi_hit_type, begin_multi_hit, offer_count),
+        "all_touching": Query(multi_hit_type, begin_multi_hit, offer_all),
     }
 
 

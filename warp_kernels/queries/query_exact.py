@@ -67,6 +67,8 @@ EXACT_QUERIES = {
     "any": replace(_FLOAT32["any"], offer=offer_any),
     "count": replace(_FLOAT32["count"], offer=offer_count),
     "all": replace(_FLOAT32["all"], offer=offer_all),
+    "count_touching": replace(_FLOAT32["count_touching"], offer=offer_count),
+    "all_touching": replace(_FLOAT32["all_touching"], offer=offer_all),
 }
 
 

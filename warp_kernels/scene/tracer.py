@@ -125,7 +125,17 @@ class WarpTracer:
             expect_hits_fit(total, self.precision, self.device, work.max_bytes)
             t, prim, uv = self._outputs(total)
             lanes = self._lanes(work, loaded)
-            launch_all(self.tree, *_arrays(loaded), counts, offsets, t, prim, uv, lanes=lanes)
+            launch_all(
+                self.tree,
+                *_arrays(loaded),
+                counts,
+                offsets,
+                t,
+                prim,
+                uv,
+                touching=work.touching,
+                lanes=lanes,
+            )
             if rays.library is NUMPY:
                 check(self.tree)
                 arrays = offsets.numpy(), t.numpy(), prim.numpy(), uv.numpy()
@@ -158,7 +168,8 @@ class WarpTracer:
     def _count(self, rays: WarpRays, work: Work) -> tuple[Any, Any]:
         counts = wp.empty(len(rays), dtype=wp.int32, device=self.device)
         steps = self._steps(len(rays), work)
-        launch_count(self.tree, *_arrays(rays), counts, stats=steps, lanes=self._lanes(work, rays))
+        lanes = self._lanes(work, rays)
+        launch_count(self.tree, *_arrays(rays), counts, stats=steps, touching=work.touching, lanes=lanes)
         return counts, steps
 
     def _returned(self, output: Any, steps: Any, rays: Rays) -> tuple[Any, Stats | None]:

@@ -65,7 +65,7 @@ def make_traversal(
     ray_base = stack_size * (2 if in_order else 1)
     lanes = lanes_of(length, ray_base + ray_words, precision)
     blocks, node = block_form(lanes, nodes, precision), NODES[nodes](lanes)
-    triangles = make_triangles(lanes, blocks, ray_base, precision)
+    triangles = make_triangles(lanes, blocks, ray_base, precision, query_type.crossings)
     frame_type = FRAMES[precision]
     visit = make_visit(lanes, node, stack_size, in_order, frame_type)
     real = PRECISIONS[precision].real

@@ -1,10 +1,34 @@
-"""Edge functions of the watertight test, in all lanes at once and in either precision."""
+"""Edge functions of the watertight test, in either precision, and the side on which a ray passes them."""
 
 from types import SimpleNamespace
 
 import warp as wp
 
 from wive.warp_kernels.lanes.lanes import without_gradient
+
+
+@wp.func
+def beside(side: wp.float64, p: wp.vec3d, q: wp.vec3d):
+    """An edge function's sign for crossings: if it is zero, that of the ray moved by (h, h^2), h -> 0."""
+    return wp.where(side != wp.float64(0.0), side, wp.where(p[1] != q[1], p[1] - q[1], q[0] - p[0]))
+
+
+@wp.func
+def sides_beside(sides: wp.vec3d, a: wp.vec3d, b: wp.vec3d, c: wp.vec3d):
+    """The edge functions opposite to the corners a, b and c as the moved ray has them.
+
+    None is zero unless two corners are one. As cpu/traverse/crossings.h, which says why.
+    """
+    return wp.vec3d(beside(sides[0], c, b), beside(sides[1], a, c), beside(sides[2], b, a))
+
+
+@wp.func
+def side_passed(sides: wp.vec3d):
+    """1 or -1, the sign of the edge functions; 0 if they differ in sign or are all zero."""
+    zero = wp.float64(0.0)
+    negative = wp.where(sides[0] < zero or sides[1] < zero or sides[2] < zero, 1, 0)
+    positive = wp.where(sides[0] > zero or sides[1] > zero or sides[2] > zero, 1, 0)
+    return positive - negative
 
 
 def edges_in_lanes(

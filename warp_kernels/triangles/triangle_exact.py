@@ -6,14 +6,13 @@ import warp as wp
 
 from wive.warp_kernels.lanes.exact_native import (
     compare_distances,
-    lies_within,
     may_hit,
     solve_exactly,
 )
 from wive.warp_kernels.lanes.lanes import lowest_lane, product, without_gradient
 from wive.warp_kernels.lanes.layout import NO_PRIM
 from wive.warp_kernels.lanes.precision import stack_numbers
-from wive.warp_kernels.queries.frame import MAX_FLOAT, RayFrame, axes_of, component
+from wive.warp_kernels.queries.frame import MAX_FLOAT, SUBNORMAL_STEP, RayFrame, axes_of, component
 from wive.warp_kernels.queries.query import Query
 from wive.warp_kernels.queries.query_exact import ExactBest
 
@@ -33,7 +32,6 @@ INVERSE = 2
 RAY_WORDS = DOUBLE_WORDS + 2 * 3
 
 SMALLEST_SHEAR = wp.constant(wp.float64(2.0**-100))
-SUBNORMAL_STEP = wp.constant(wp.float32(2.0**-148))
 LOWEST = wp.constant(wp.float32(-MAX_FLOAT))
 
 
@@ -50,7 +48,7 @@ def block_of(place: int):
 
 
 def exact_triangles(
-    lanes: SimpleNamespace, blocks: SimpleNamespace, ray_base: int, precision: str
+    lanes: SimpleNamespace, blocks: SimpleNamespace, ray_base: int, precision: str, crossings: bool
 ) -> SimpleNamespace:
     """The test for a lane form and block form; its ray is kept from stack word `ray_base` on.
 
@@ -115,36 +113,25 @@ def exact_triangles(
 
     @without_gradient
     @wp.func(inline=False)
-    def solve(
-        units: wp.uint64, block: int, j: int, stack: stack_argument, best_t: float, perturb_edges: bool
-    ):
+    def solve(units: wp.uint64, block: int, j: int, stack: stack_argument, best_t: float):
         """t, u, v and 1; the last is 0 if the ray misses the triangle or hits it outside its limits.
 
         It is 0 also for a hit beyond best_t, which is in the caller's units.
         """
-        at = vertices_of(units, block, j)
-        stride = stride_of(units, block)
-        origin = load_vector(stack, ORIGIN)
-        direction = load_vector(stack, DIRECTION)
-        hit = solve_exactly(
+        return solve_exactly(
             units,
-            at,
-            stride,
+            vertices_of(units, block, j),
+            stride_of(units, block),
             axes_kept(stack),
-            origin,
-            direction,
+            load_vector(stack, ORIGIN),
+            load_vector(stack, DIRECTION),
             load_double(stack, SHEAR),
             load_double(stack, SHEAR + 1),
             load_double(stack, INVERSE),
             load(stack, TMIN),
             wp.min(best_t, load(stack, TMAX)),
-            perturb_edges,
+            crossings,
         )
-        if hit[3] != 0.0 and not lies_within(
-            units, at, stride, origin, direction, hit[0], load(stack, TMIN), load(stack, TMAX)
-        ):
-            hit[3] = 0.0
-        return hit
 
     @without_gradient
     @wp.func(inline=False)
@@ -223,7 +210,6 @@ def make_exact_offer(
     stack_argument, state_type = lanes.stack_argument, query.state
     solve, offer, take_closest = triangles.solve, query.offer, triangles.take_closest
     compares: bool = offer is None
-    perturb_edges: bool = query.perturb_edges
 
     @without_gradient
     @wp.func
@@ -240,7 +226,7 @@ def make_exact_offer(
         best_t = float(wp.inf)
         if wp.static(compares):
             best_t = found.given_t
-        hit = solve(units, block, j, stack, best_t, perturb_edges)
+        hit = solve(units, block, j, stack, best_t)
         if hit[3] != 0.0:
             if wp.static(compares):
                 found = take_closest(found, units, block + j, stack, hit, prim)

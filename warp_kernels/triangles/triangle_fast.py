@@ -18,9 +18,12 @@ RAY_NUMBERS = 6
 
 
 def fast_triangles(
-    lanes: SimpleNamespace, blocks: SimpleNamespace, ray_base: int, precision: str
+    lanes: SimpleNamespace, blocks: SimpleNamespace, ray_base: int, precision: str, crossings: bool
 ) -> SimpleNamespace:
-    """The test for a lane form, block form and precision; its ray is kept from stack word `ray_base` on."""
+    """The test for a lane form, block form and precision; its ray is kept from stack word `ray_base` on.
+
+    crossings: not used, because triangles that share an edge may disagree about a ray through it.
+    """
     length: int = lanes.triangles_length
     vector, products = lanes.triangles, lanes.products
     load, edge, edge_at, used = blocks.load, blocks.edge, blocks.edge_at, blocks.used

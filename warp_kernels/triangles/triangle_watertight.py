@@ -10,7 +10,7 @@ import warp as wp
 from wive.warp_kernels.lanes.lanes import load_float, lowest_lane, product, product_double, without_gradient
 from wive.warp_kernels.lanes.precision import stack_numbers
 from wive.warp_kernels.queries.frame import RayFrame, axes_of, component
-from wive.warp_kernels.triangles.sheared import edges_in_lanes
+from wive.warp_kernels.triangles.sheared import edges_in_lanes, side_passed, sides_beside
 
 # What the test keeps of a ray, in words: the mesh axis of each sheared axis, then floats by sheared axis:
 # origin, direction (three each) and shear (two). Only leaves need it, so it is kept in the stack's memory
@@ -43,7 +43,7 @@ def edges_of(a: wp.vec3d, b: wp.vec3d, c: wp.vec3d):
 
 
 def watertight_triangles(
-    lanes: SimpleNamespace, blocks: SimpleNamespace, ray_base: int, precision: str
+    lanes: SimpleNamespace, blocks: SimpleNamespace, ray_base: int, precision: str, crossings: bool
 ) -> SimpleNamespace:
     """The test for a lane form and block form; its ray is kept from stack word `ray_base` on."""
     length: int = lanes.triangles_length
@@ -176,11 +176,10 @@ def watertight_triangles(
         a = rounded(units, at_a, stride, stack)
         b = rounded(units, at_b, stride, stack)
         c = rounded(units, at_c, stride, stack)
-        w = edges_of(a, b, c)
-        zero = wp.float64(0.0)
-        negative = wp.where(w[0] < zero or w[1] < zero or w[2] < zero, 1, 0)
-        positive = wp.where(w[0] > zero or w[1] > zero or w[2] > zero, 1, 0)
-        return positive - negative
+        sides = edges_of(a, b, c)
+        if wp.static(crossings):
+            sides = sides_beside(sides, a, b, c)
+        return side_passed(sides)
 
     edges = edges_in_lanes(lanes, blocks, axis_of, origin_of, shear_of)
 

@@ -12,7 +12,7 @@ from wive.warp_kernels.lanes.lanes import load_double, product_double, without_g
 from wive.warp_kernels.lanes.native import EXACT_WEIGHT
 from wive.warp_kernels.lanes.precision import stack_numbers
 from wive.warp_kernels.queries.frame import RayFrame64, axes_of, component
-from wive.warp_kernels.triangles.sheared import edges_in_lanes
+from wive.warp_kernels.triangles.sheared import edges_in_lanes, side_passed, sides_beside
 
 # What the test keeps of a ray: the mesh axis of each sheared axis, three words, then doubles, of which these
 # are the first: origin (three), shear (two), direction on the longest axis.
@@ -22,6 +22,9 @@ SHEAR = 3
 FORWARD = 5
 RAY_WORDS = AXIS_WORDS + 2 * 6
 LEAST_SUM = wp.constant(wp.float64(2.0**-26))
+SMALLEST_SUM = wp.constant(wp.float64(2.0**-400))  # above it no product that matters underflows
+SMALL_SIZE = wp.constant(wp.float64(2.0**-300))
+SCALE_UP = wp.constant(wp.float64(2.0**300))
 SMALLEST_SHEAR = wp.constant(wp.float64(2.0**-100))
 
 
@@ -50,7 +53,7 @@ def largest(a: wp.vec3d, b: wp.vec3d, c: wp.vec3d, axis: int):
 
 
 def watertight_doubles(
-    lanes: SimpleNamespace, blocks: SimpleNamespace, ray_base: int, precision: str
+    lanes: SimpleNamespace, blocks: SimpleNamespace, ray_base: int, precision: str, crossings: bool
 ) -> SimpleNamespace:
     """The test for a lane form and block form; its ray is kept from stack word `ray_base` on."""
     length: int = lanes.triangles_length
@@ -123,7 +126,7 @@ def watertight_doubles(
         wc = weight_of(a, b)
         zero = wp.float64(0.0)
         product_bound = product_double(largest(a, b, c, 0), largest(a, b, c, 1))
-        least = product_double(product_bound, LEAST_SUM)
+        least = wp.max(product_double(product_bound, LEAST_SUM), SMALLEST_SUM)
         if wp.abs(wa + wb + wc) <= least or wa == zero or wb == zero or wc == zero:
             return solve_exactly(units, block, j, stack)
         return hit_of(wa, wb, wc, wp.vec3d(a[2], b[2], c[2]), stack)
@@ -135,14 +138,33 @@ def watertight_doubles(
         a = sheared(units, block, j, 0, stack)
         b = sheared(units, block, j, 1, stack)
         c = sheared(units, block, j, 2, stack)
+        # Scaled up until products don't underflow; the signs and ratios of weights stay.
+        scale = wp.float64(1.0)
+        size = wp.max(largest(a, b, c, 0), largest(a, b, c, 1))
+        zero = wp.float64(0.0)
+        while size > zero and size < SMALL_SIZE:
+            scale = scale * SCALE_UP
+            size = size * SCALE_UP
+        z = wp.vec3d(a[2], b[2], c[2])
+        a = a * scale
+        b = b * scale
+        c = c * scale
         wa = exact_weight_of(b, c)
         wb = exact_weight_of(c, a)
         wc = exact_weight_of(a, b)
-        zero = wp.float64(0.0)
-        hit = hit_of(wa, wb, wc, wp.vec3d(a[2], b[2], c[2]), stack)
-        negative = wa < zero or wb < zero or wc < zero
-        positive = wa > zero or wb > zero or wc > zero
-        if negative == positive:
+        det = wa + wb + wc
+        # Shares before products, which could underflow otherwise.
+        shares = wp.vec3d(wa / det, wb / det, wc / det)
+        depth = (
+            product_double(shares[0], z[0])
+            + product_double(shares[1], z[1])
+            + product_double(shares[2], z[2])
+        )
+        hit = wp.vec3d(depth / load(stack, FORWARD), shares[1], shares[2])
+        sides = wp.vec3d(wa, wb, wc)
+        if wp.static(crossings):
+            sides = sides_beside(sides, a, b, c)
+        if side_passed(sides) == 0:
             hit[0] = wp.float64(wp.nan)
         return wp.vec3d(hit[0], hit[1] + zero, hit[2] + zero)  # no -0
 

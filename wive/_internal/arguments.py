@@ -50,14 +50,26 @@ class Counted(QueryOptions):
     stats: Literal[True]
 
 
-class PlainAll(Plain, total=False):
-    """The options of a query for all hits that returns no counters."""
+class PlainCount(Plain, total=False):
+    """The options of `count` without counters."""
+
+    touching: bool
+
+
+class CountedCount(Counted, total=False):
+    """The options of `count` with counters."""
+
+    touching: bool
+
+
+class PlainAll(PlainCount, total=False):
+    """The options of `intersect_all` without counters."""
 
     max_bytes: int | None
 
 
-class CountedAll(Counted, total=False):
-    """The options of a query for all hits that returns counters."""
+class CountedAll(CountedCount, total=False):
+    """The options of `intersect_all` with counters."""
 
     max_bytes: int | None
 
@@ -69,6 +81,7 @@ class Work(NamedTuple):
     in_flight: int = 0  # 0 leaves it to the core
     stats: bool = False
     lanes: Lanes | None = None  # None leaves it to the Warp backend
+    touching: bool = False  # of several hits: every triangle touched, not every crossing
     max_bytes: int = 0  # of all hits; 0 is by what memory there is
 
 
@@ -205,12 +218,13 @@ def work(
     asked_in_flight: int | None,
     asked_lanes: LanesOption,
     stats: bool,
+    touching: bool = False,
     max_bytes: int | None = None,
 ) -> Work:
     """The options of a query, checked; ValueError for one that the backend lacks."""
     chosen = lanes(asked_lanes)
     limit = 0 if max_bytes is None else integer("max_bytes", max_bytes, 1, MOST_BYTES)
-    flags = flag("stats", stats), chosen, limit
+    flags = flag("stats", stats), chosen, flag("touching", touching), limit
     checked = _work((threads(asked_threads), in_flight(asked_in_flight), *flags))
     refuse_lacking(backend, lacks, {"threads": asked_threads, "in_flight": asked_in_flight, "lanes": chosen})
     return checked

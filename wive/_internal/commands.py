@@ -3,6 +3,7 @@
 import os
 import time
 from argparse import Namespace
+from collections.abc import Callable
 from dataclasses import fields, replace
 from functools import partial
 from typing import Any
@@ -59,9 +60,12 @@ def trace_rays(options: Namespace) -> None:
     refuse_lacking(scene.backend, scene._tracer.lacks, {"threads": options.threads})
     origins, directions, tmin, tmax = _read_rays(options.rays, real_named(options.precision))
     count = len(origins)
-    if options.max_bytes is not None and not options.all:
-        raise ValueError("max_bytes is only for all hits: add --all, or leave it out")
-    query = partial(scene.intersect_all, max_bytes=options.max_bytes) if options.all else scene.intersect
+    if not options.all and (options.touching or options.max_bytes is not None):
+        option = "--touching" if options.touching else "max_bytes"
+        raise ValueError(f"{option} is only for all hits: add --all, or leave it out")
+    query: Callable[..., Hits | AllHits] = scene.intersect
+    if options.all:
+        query = partial(scene.intersect_all, touching=options.touching, max_bytes=options.max_bytes)
     found: list[Hits | AllHits] = []
     begin = time.perf_counter()
     with progress_bar(count, "ray", "tracing") as advance:

@@ -69,14 +69,16 @@ class CpuTracer:
     def count(self, rays: Rays, work: Work) -> tuple[Any, Stats | None]:
         """(n,) int32, the number of hits."""
         arrays, _ = self._traced(rays)
-        counts, steps = self.bvh.count(self._kernels, *arrays, work.threads, work.in_flight, work.stats)
+        counts, steps = self.bvh.count(
+            self._kernels, *arrays, work.threads, work.in_flight, work.stats, touching=work.touching
+        )
         library = rays.library
         return library.from_numpy(counts), None if steps is None else stats_of(steps, library)
 
     def intersect_all(self, rays: Rays, work: Work) -> tuple[AllHits, Stats | None]:
         """All hits."""
         arrays, near = self._traced(rays)
-        options = work.threads, work.in_flight, work.stats, work.max_bytes
+        options = work.threads, work.in_flight, work.stats, work.touching, work.max_bytes
         offsets, t, prim, uv, steps = self.bvh.intersect_all(self._kernels, *arrays, *options)
         hits = AllHits(offsets, t, prim, uv, self.bvh.vertices, self._faces)
         if near is not None:
