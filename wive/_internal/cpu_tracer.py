@@ -78,8 +78,9 @@ class CpuTracer:
     def intersect_all(self, rays: Rays, work: Work) -> tuple[AllHits, Stats | None]:
         """All hits."""
         arrays, near = self._traced(rays)
-        options = work.threads, work.in_flight, work.stats, work.touching, work.max_bytes
-        offsets, t, prim, uv, steps = self.bvh.intersect_all(self._kernels, *arrays, *options)
+        options = work.threads, work.in_flight, work.stats, work.touching
+        found = self.bvh.intersect_all(self._kernels, *arrays, *options, max_bytes=work.max_bytes)
+        offsets, t, prim, uv, steps = found
         hits = AllHits(offsets, t, prim, uv, self.bvh.vertices, self._faces)
         if near is not None:
             hits = AllHits(offsets, near.t(t, hits.ray), prim, uv, self.bvh.vertices, self._faces)
