@@ -96,12 +96,6 @@ struct RayFrame {
         }
         const Real near = caller_tmin * unscale, far = caller_tmax * unscale;
         interval = Interval<Real>::of(near, far);
-        // Limits are compared with t as it is returned. Scaling is exact if nothing is infinite or nearly subnormal.
-        constexpr Real least = 2 * std::numeric_limits<Real>::min(), most = std::numeric_limits<Real>::max();
-        const bool exact = ((caller_tmin == 0) | ((caller_tmin >= least) & (near >= least) & (near <= most))) &
-                           (caller_tmax >= least) & (far >= least);
-        if (!exact) [[unlikely]]
-            interval = scaled_limits(caller_tmin, caller_tmax, unscale);
 
         constexpr float smallest_part = 0x1p-30f, slack_factor = 0x1p-20f;
         constexpr float least_magnitude = 0x1p-100f;             // keeps the slack from vanishing if everything is tiny
@@ -125,7 +119,17 @@ struct RayFrame {
         reciprocal.store(rdir);
         (Float4::all(0.0f) - (distance + slack)).store(near_bias);
         (slack - distance).store(far_bias);
+        if (!scales_exactly(caller_tmin, caller_tmax, near, far))
+            [[unlikely]]  // a call, so here, where no vector is live
+            interval = scaled_limits(caller_tmin, caller_tmax, unscale);
         return true;
+    }
+
+    // Whether t can be compared with the scaled limits near and far as well as with the caller's, because neither is
+    // nearly subnormal or, on the wrong side, infinite.
+    [[gnu::always_inline]] static bool scales_exactly(Real tmin, Real tmax, Real near, Real far) {
+        constexpr Real least = 2 * std::numeric_limits<Real>::min(), most = std::numeric_limits<Real>::max();
+        return ((tmin == 0) | ((tmin >= least) & (near >= least) & (near <= most))) & (tmax >= least) & (far >= least);
     }
 
     // What load() guarantees when it returns true; asserted when traversal begins.

@@ -42,9 +42,13 @@ struct ExactFrame : AxisFrame<I> {
         inverse = 1.0 / d[axis[2]];
         // A t may have been rounded into the interval; the slack of the boxes covers that unless t is subnormal or
         // infinite.
-        constexpr float step = 0x1p-148f, most = std::numeric_limits<float>::max();
-        const float low = caller_tmin < most ? caller_tmin : most, high = caller_tmax > -most ? caller_tmax : -most;
-        this->interval = Interval<float>::of((low - step) * this->unscale, (high + step) * this->unscale);
+        const float unscale = this->unscale;
+        if (!this->scales_exactly(caller_tmin, caller_tmax, caller_tmin * unscale, caller_tmax * unscale))
+            [[unlikely]] {
+            constexpr float step = 0x1p-148f, most = std::numeric_limits<float>::max();
+            const float low = caller_tmin < most ? caller_tmin : most, high = caller_tmax > -most ? caller_tmax : -most;
+            this->interval = Interval<float>::of((low - step) * unscale, (high + step) * unscale);
+        }
         shear[0] = slope(d[axis[0]] * inverse);
         shear[1] = slope(d[axis[1]] * inverse);
         // 96 e M^2, M (magnitude) no less than the distance of any corner from the origin along an axis.
