@@ -19,6 +19,8 @@ from wive._internal.placed_mesh import Float64, Found, Int64, PlacedMesh
 from wive._internal.precision import FLOAT64, Floats, real_named
 from wive.scene import Scene
 
+LEAST_SQUARED = 1e-280  # shorter vectors lose digits when they are squared
+
 
 class RayMeshIntersector:
     """Ray queries on a `trimesh.Trimesh`, with the methods of trimesh's own intersectors.
@@ -151,10 +153,12 @@ class RayMeshIntersector:
         self, placed: PlacedMesh, origins: Float64, directions: Float64, most: int | None
     ) -> Found:
         """One hit per place: all first ones, then all second ones, and so on."""
-        found, places = placed.every_hit(origins, directions, self._threads)
-        found = found.at(np.append(True, places[1:] != places[:-1])[: len(places)])
+        found, again = placed.every_hit(origins, directions, self._threads)
+        if again is not None:
+            found = found.at(~again)
         ray = found.ray
-        depth = np.arange(len(ray)) - np.searchsorted(ray, ray)
+        counts = np.bincount(ray, minlength=len(origins))
+        depth = np.arange(len(ray)) - (np.cumsum(counts) - counts)[ray]
         if len(ray) and depth.max() < 1 << 16:
             depth = depth.astype(np.uint16)  # NumPy sorts 16-bit integers by radix
         order = np.argsort(depth, kind="stable")
@@ -197,9 +201,14 @@ def _rays(ray_origins: ArrayLike, ray_directions: ArrayLike) -> tuple[Float64, F
             f"got {origins.shape} and {directions.shape}"
         )
     with np.errstate(invalid="ignore", divide="ignore"):
-        # Divided by their longest component first: squares of very long or short ones are no numbers.
-        directions = directions / np.abs(directions).max(axis=1, keepdims=True, initial=0)
-        return origins, directions / np.sqrt(np.einsum("ij,ij->i", directions, directions))[:, None]
+        squared = np.einsum("ij,ij->i", directions, directions)
+        if len(squared) and not LEAST_SQUARED <= squared.min() <= squared.max() < np.inf:
+            # Squares of very long or short vectors are no numbers: these are scaled by a component first.
+            odd = ~((squared >= LEAST_SQUARED) & (squared < np.inf))
+            directions = directions.copy()
+            directions[odd] /= np.abs(directions[odd]).max(axis=1, keepdims=True)
+            squared[odd] = np.einsum("ij,ij->i", directions[odd], directions[odd])
+        return origins, directions / np.sqrt(squared)[:, None]
 
 
 def _rows(name: str, value: ArrayLike) -> Float64:

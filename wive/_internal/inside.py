@@ -82,8 +82,8 @@ def _places_passed(
 ) -> tuple[Int64, NDArray[np.bool_]]:
     """How many places each ray passes, and whether that is sure: at an edge it passes several planes."""
     directions = np.tile(direction, (len(points), 1))
-    found, places = placed.every_hit(points, directions, threads)
-    is_first = np.append(True, places[1:] != places[:-1])[: len(places)]
+    found, again = placed.every_hit(points, directions, threads)
+    is_first = np.ones(len(found.ray), np.bool_) if again is None else ~again
     (first,) = np.nonzero(is_first)
     normals = _unit_normals(placed, found.prim)
     tilted = np.cross(normals, normals[first[np.cumsum(is_first) - 1]])
@@ -99,9 +99,11 @@ def _is_doubled_throughout(placed: PlacedMesh, threads: int | None) -> bool:
     rows = faces[np.linspace(0, len(faces) - 1, min(SAMPLES, len(faces)), dtype=np.intp)]
     directions = np.tile(DIRECTIONS[0], (len(rows), 1))
     origins = placed.vertices[rows].mean(axis=1) - 2 * np.sqrt(3) * placed.size * directions
-    _, places = placed.every_hit(origins, directions, threads)
-    _, counts = np.unique(places, return_counts=True)
-    return len(counts) > 0 and bool((counts % 2 == 0).all())
+    _, again = placed.every_hit(origins, directions, threads)
+    if again is None:
+        return False
+    counts = np.bincount(np.cumsum(~again))[1:]
+    return bool((counts % 2 == 0).all())
 
 
 def _unit_normals(placed: PlacedMesh, prim: NDArray[np.int32]) -> Float64:

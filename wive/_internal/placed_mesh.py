@@ -88,19 +88,25 @@ class PlacedMesh:
         ray, prim, uv = found
         return _cpu.points_on_rays(self.vertices, self.scene.faces, prim, uv, ray, origins, directions)
 
-    def every_hit(self, origins: Float64, directions: Float64, threads: int | None) -> tuple[Found, Int64]:
-        """All hits, and a number for each: hits of one ray in one place have the same number."""
+    def every_hit(
+        self, origins: Float64, directions: Float64, threads: int | None
+    ) -> tuple[Found, NDArray[np.bool_] | None]:
+        """All hits, and whether each is in the same place as the one before; None if none is."""
         every = self.scene.intersect_all(*self.rays(origins, directions), threads=threads)
-        ray = every.ray
-        found, places = Found(ray, every.prim, every.uv), np.arange(len(ray))
-        unsure = UNSURE[self.scene.precision] * np.maximum(1, abs(every.t[1:]))
-        close = (ray[1:] == ray[:-1]) & (np.diff(every.t) <= unsure)
-        if not close.any():
-            return found, places
-        # In float64, hits that are close together are sorted again: t may have hidden their order.
-        along = self.points(found, origins, directions) - origins[ray]
-        distance = np.einsum("ij,ij->i", along, directions[ray])
-        order = np.lexsort((found.prim, distance, ray))
-        same = (np.diff(distance[order]) <= SAME_PLACE * self.size) & (ray[1:] == ray[:-1])
-        places[1:] = np.cumsum(~same)
-        return found.at(order), places
+        found, t = Found(every.ray, every.prim, every.uv), every.t
+        unsure = UNSURE[self.scene.precision]
+        (close,) = np.nonzero(t[1:] - t[:-1] <= unsure + unsure * t[1:])
+        close = close[found.ray[close] == found.ray[close + 1]]
+        if len(close) == 0:
+            return found, None
+        # Hits that are close together are sorted again, by float64: t may have hidden their order.
+        rows = np.union1d(close, close + 1)
+        follows = np.isin(rows, close + 1)
+        some = found.at(rows)
+        along = self.points(some, origins, directions) - origins[some.ray]
+        distance = np.einsum("ij,ij->i", along, directions[some.ray])
+        order = np.lexsort((some.prim, distance, np.cumsum(~follows)))
+        found.prim[rows], found.uv[rows] = some.prim[order], some.uv[order]
+        again = np.zeros(len(found.ray), np.bool_)
+        again[rows[1:]] = follows[1:] & (np.diff(distance[order]) <= SAME_PLACE * self.size)
+        return found, again
