@@ -53,16 +53,17 @@ class Scene:
         """Build the tree.
 
         Arguments:
-            vertices: (v,3) real numbers. An array of float64 makes a float64 scene: vertices, rays, t and uv
-                are float64, for coordinates such as surveys'. All else, lists included, is used as float32.
+            vertices: (v,3) real numbers. Their dtype decides the scene's precision: an array of float64 makes
+                a float64 scene, whose vertices, rays, t and uv are float64, for coordinates such as surveys';
+                all else, lists included, makes a float32 scene. Vertices that no face uses may be NaN.
             faces: (f,3) integers, three vertices per triangle, counter-clockwise as seen from the side that
                 its normal points to. Zero-area triangles keep their number and are never hit.
             backend: "auto" (the fastest CPU backend this machine has) or a name in `wive.backends()`.
             device: the device of backend "warp", by Warp's names: "cpu", "cuda:0", ...; None is the first
                 CUDA device, else "cpu". A device alone implies backend "warp"; CPU backends take none.
             accuracy: "watertight" (rays never slip between triangles that share an edge or vertex), "fast",
-                or "exact" (hits, their order, t and uv are those of exact arithmetic, rounded once; float32
-                numbers only, whatever their dtype).
+                or "exact" (hits, their order, t and uv are those of exact arithmetic, rounded once; vertices
+                and rays that float32 can't hold, whatever their dtype, are refused).
             nodes: "float32", or "compressed": the same hits, under two thirds the bytes, for large trees.
             quality: "medium", or "high" for a tree that takes about four times as long to build and gives the
                 same hits in fewer steps: a sixth fewer if triangle sizes differ much, none in even meshes.
@@ -134,8 +135,9 @@ class Scene:
             stats: return `(hits, stats)`, with what each ray visited.
 
         Results depend on none of `threads`, `in_flight` and `lanes`, nor on how rays are split into batches.
-        A ray misses if its origin is NaN or infinite, its direction is NaN, infinite or zero, or its tmin is
-        above its tmax.
+        A ray misses if its origin is NaN or infinite, its direction is NaN, infinite or zero, a number of it
+        is masked, or its tmin is above its tmax. Rays that are not given in float32 may start far away from a
+        float32 scene: they are brought near before they are rounded.
 
         Raises ValueError or TypeError, in one line naming the argument; an option that is only for other
         backends than the scene's raises ValueError.
