@@ -98,6 +98,16 @@ def test_trace_writes_the_hits_of_the_library(ball, tmp_path, capsys, monkeypatc
         np.testing.assert_array_equal(hits["uv"], expected.uv)
 
 
+def test_rays_from_far_away_are_brought_near_before_they_are_rounded(ball, tmp_path):
+    random = np.random.default_rng(1)
+    targets, directions = random.uniform(-0.5, 0.5, (50, 3)), random.standard_normal((50, 3))
+    np.savez(tmp_path / "rays.npz", origins=targets - 1e7 * directions, directions=directions)
+    assert run("trace", ball, tmp_path / "rays.npz", "-o", tmp_path / "hits.npz") == 0
+    with np.load(tmp_path / "hits.npz") as hits:
+        assert (hits["prim"] >= 0).all()
+        np.testing.assert_allclose(hits["t"], 1e7, rtol=1e-6)
+
+
 def test_info_describes_mesh_and_tree(ball, capsys):
     assert run("info", ball, "--accuracy", "fast", "--backend", "scalar") == 0
     lines = dict(line.split(maxsplit=1) for line in capsys.readouterr().out.splitlines())

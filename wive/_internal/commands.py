@@ -17,7 +17,7 @@ from wive._internal.files import atomic_write, check_output
 from wive._internal.npz_writer import write_npz
 from wive._internal.npzfile import Npz, check_input, open_npy_or_npz
 from wive._internal.picture import Settings
-from wive._internal.precision import Floats, Real, real_named
+from wive._internal.precision import FLOAT64, Floats, Real, real_named
 from wive._internal.progress import progress_bar
 from wive._internal.terrain import terrain_camera, terrain_mesh
 from wive._internal.textures import names_file
@@ -58,7 +58,9 @@ def trace_rays(options: Namespace) -> None:
     check_input(options.rays)
     scene = _scene(options, *load_mesh(options.mesh, options.precision))
     refuse_lacking(scene.backend, scene._tracer.lacks, {"threads": options.threads})
-    origins, directions, tmin, tmax = _read_rays(options.rays, real_named(options.precision))
+    origins, directions, tmin, tmax = _read_rays(
+        options.rays, real_named(options.precision), scene.accuracy == "exact"
+    )
     count = len(origins)
     if not options.all and (options.touching or options.max_bytes is not None):
         option = "--touching" if options.touching else "max_bytes"
@@ -161,8 +163,8 @@ def _camera(options: Namespace, scene: Scene) -> Camera:
     return replace(camera, **{name: value for name, value in given.items() if value is not None})
 
 
-def _read_rays(name: str, real: Real) -> tuple[Floats, ...]:
-    """Origins, directions, tmin and tmax, in the form that the core takes."""
+def _read_rays(name: str, real: Real, exact: bool) -> tuple[Floats, ...]:
+    """Origins, directions, tmin and tmax, checked; for accuracy "exact" rounded to `real`'s dtype."""
     expected = "a file of rays, (n,6) or (n,8) in an .npy or `origins` and `directions` in an .npz"
     with open_npy_or_npz(name, expected) as loaded:
         if isinstance(loaded, Npz):
@@ -177,6 +179,8 @@ def _read_rays(name: str, real: Real) -> tuple[Floats, ...]:
             columns = [loaded[:, :3], loaded[:, 3:6], *limits]
     try:
         origins, directions, tmin, tmax = columns
+        if not exact and not np.asarray(origins).dtype == np.asarray(directions).dtype == np.float32:
+            real = FLOAT64  # a float32 scene brings rays from far away near before it rounds them
         return checked_rays(origins, directions, tmin, tmax, real)
     except (TypeError, ValueError) as error:
         raise ValueError(f"{name}: {error}") from error
