@@ -80,7 +80,7 @@ def test_a_cavity_is_outside_however_its_faces_are_stored():
         np.testing.assert_array_equal(contained(points, vertices, np.vstack(faces)), inside)
 
 
-@pytest.mark.parametrize("accuracy", ["exact"])
+@pytest.mark.parametrize("accuracy", ["watertight", "exact"])
 @pytest.mark.parametrize("place", [(0, 0, 0), (0.1, 0.2, 0.3), (1000, -2000, 5000)])
 def test_points_whose_test_line_meets_vertices_are_inside(accuracy, place):
     faces = [[0, 2, 4], [0, 4, 3], [0, 3, 5], [0, 5, 2], [1, 4, 2], [1, 3, 4], [1, 5, 3], [1, 2, 5]]
