@@ -28,6 +28,7 @@ Mesh = tuple[np.ndarray, np.ndarray]
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--slow", action="store_true", help="also run the tests that take minutes")
+    parser.addoption("--cases", type=int, default=40, help="cases per test of tests/fuzz; default: 40")
     parser.addoption(
         "--device",
         default=os.environ.get("WIVE_TEST_DEVICE"),
