@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wive._internal.formats import Mesh
+from wive._internal.room import expect_room
 
 Matrix = NDArray[np.float64]
 IDENTITY = np.eye(4)
@@ -20,9 +21,10 @@ MOST = 2**31 - 1  # vertices and triangles are numbered by int32
 
 
 def check_counts(vertices: int, triangles: int) -> None:
-    """Raise ValueError if copies have more vertices or triangles than int32 numbers, before any is made."""
+    """Raise ValueError if int32 can't number all copies, MemoryError if memory can't hold them."""
     if max(vertices, triangles) > MOST:
         raise ValueError(f"scene: has {vertices} vertices and {triangles} triangles, expected at most {MOST}")
+    expect_room(3 * (vertices + triangles), np.float64)  # placed in double; then joined, in half of that
 
 
 def joined(parts: Iterable[Part]) -> Mesh:
