@@ -63,7 +63,7 @@ class Scene:
                 CUDA device, else "cpu". A device alone implies backend "warp"; CPU backends take none.
             accuracy: "watertight" (rays never slip between triangles that share an edge or vertex), "fast",
                 or "exact" (hits, their order, t and uv are those of exact arithmetic, rounded once; vertices
-                and rays that float32 can't hold, whatever their dtype, are refused).
+                that float32 can't hold, whatever their dtype, are refused).
             nodes: "float32", or "compressed": the same hits, under two thirds the bytes, for large trees.
             quality: "medium", or "high" for a tree that takes about four times as long to build and gives the
                 same hits in fewer steps: a sixth fewer if triangle sizes differ much, none in even meshes.

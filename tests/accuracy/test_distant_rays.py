@@ -75,13 +75,14 @@ def test_each_ray_is_moved_by_itself(backend, aimed):
             np.testing.assert_array_equal(getattr(alone, name)[0], getattr(together, name)[i])
 
 
-def test_float32_rays_and_exact_scenes_are_taken_as_they_are(backend, aimed):
+def test_rays_that_float32_holds_are_taken_as_they_are_by_exact_scenes(backend, aimed):
     targets, directions = aimed
     rays = np.float32(targets - 1e7 * directions), np.float32(directions)
     doubles = rays[0].astype(np.float64), rays[1].astype(np.float64)
     exact = wive.Scene(*sphere(3), backend=backend, accuracy="exact")
     np.testing.assert_array_equal(exact.intersect(*doubles).prim, exact.intersect(*rays).prim)
     assert not exact.intersect(*rays).mask.all()
+    assert exact.intersect(targets - 1e7 * directions, directions).mask.all()
     watertight = wive.Scene(*sphere(3), backend=backend)
     np.testing.assert_array_equal(
         watertight.intersect(*rays).prim, watertight.intersect(rays[0][:, ::1].copy("F"), rays[1]).prim

@@ -55,8 +55,7 @@ def answers(dtype, scale, accuracy, backend, nodes, given):
             yield every.offsets, every.t, every.prim, every.uv
             yield scene.intersect(origins[:5], directions[:5], in_flight=1).t if backend != "warp" else 0,
             scene.refit(moved)
-        if accuracy != "exact":  # which refuses numbers that it would have to round
-            yield scene.intersect(as_doubles, d).t,
+        yield scene.intersect(as_doubles, d).t,
         if dtype == np.float32 and scale == 1:
             yield wive.render(scene, camera, width=16, height=16, spp=1),
     return [np.asarray(array) for group in trace() for array in group]

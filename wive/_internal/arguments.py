@@ -345,9 +345,9 @@ def _missing_if_masked(name: str, value: ArrayLike, array: NDArray[Any], real: R
     """The array's numbers in `real`'s dtype, NaN if masked: such a ray misses."""
     mask = _mask(value)
     if mask is None:
-        return real.taken(name, value, array)
+        return real.array(array)
     shown = np.where(mask, array.dtype.type(0), array)
-    numbers = real.taken(name, shown, shown).copy()
+    numbers = real.array(shown).copy()
     numbers[mask] = np.nan
     return numbers
 

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wive._internal.precision import FLOAT32, FLOAT64, Floats, Real
+from wive._internal.precision import EXACT, FLOAT64, Floats, Real
 from wive._internal.rays import Rays
 
 # From this many radii away, rounding moves a ray by less than 1e-4 radii. Nearer ones are left as they are.
@@ -94,15 +94,18 @@ def moved(rays: Rays, arrays: Traced, real: Real, ball: Ball) -> Moved | None:
     """Bring the rays that start far away near; None if there are none.
 
     `arrays` are the rays as they were rounded. Only float32 scenes, and only rays of other dtypes than that,
-    gain by it. Accuracy "exact" rounds nothing.
+    gain by it. Accuracy "exact" takes rays that float32 holds as they are.
     """
     if arrays[0] is rays.origins and arrays[1] is rays.directions:
         return None
-    if real is not FLOAT32 or not ball.may_have_far(arrays[0]) or rays.are(np.dtype(np.float32)):
+    if real is FLOAT64 or not ball.may_have_far(arrays[0]) or rays.are(np.dtype(np.float32)):
         return None
     given = rays.numpy(FLOAT64)
     origins, directions = (rows.astype(np.float64, copy=False) for rows in given[:2])
     steps = ball.steps(origins, directions)
+    if real is EXACT:
+        kept = (arrays[0] == origins).all(axis=1) & (arrays[1] == directions).all(axis=1)
+        steps[kept] = 0
     is_moved = steps != 0
     if not is_moved.any():
         return None

@@ -13,9 +13,9 @@ Floats = NDArray[np.float32 | np.float64]
 
 
 class Real:
-    """The dtype of vertices, rays, t and uv, and whether other numbers may be rounded to it.
+    """The dtype of vertices, rays, t and uv, and whether vertices may be rounded to it.
 
-    Accuracy "exact" rounds none: its answers are those for the numbers that were given.
+    Accuracy "exact" rounds none: its answers are those for the mesh that was given.
     """
 
     __slots__ = ("dtype", "limits", "name", "rounds")
@@ -85,7 +85,7 @@ def real_named(name: DTypeLike) -> Real:
 def refuse_rounded(name: str, given: ArrayLike, values: NDArray[Any], rounded: Floats) -> None:
     """Raise ValueError if a number that the user gave differs from the one it was rounded to.
 
-    NaN is kept: whether it is a vertex or a ray decides what it means.
+    NaN is kept: vertices that no face uses may be NaN.
     """
     # NumPy gives the numbers of lists and tables one dtype, which may round integers.
     exact = values if isinstance(given, np.ndarray) else np.asarray(given, object).reshape(values.shape)
