@@ -91,4 +91,5 @@ def _kernels(kernel: str) -> ctypes.CDLL:
     else:
         flags += ["-O2", "-fpeel-loops"] if gcc else ["-O3"]
     sources = [STUDY / "kernels_distance.cpp", CPU / "kernels" / "trace.cpp", CPU / "core" / "memory.cpp"]
+    sources.append(CPU / "traverse" / "scaled_limits.cpp")
     return ctypes.CDLL(str(compiled(*sources, flags=flags, headers=[CPU, STUDY])))

@@ -87,7 +87,7 @@ def test_a_fused_edge_function_would_leak_on_these_rays() -> None:
 @pytest.mark.parametrize("nodes", ["float32", "compressed"])
 def test_kernels_hit_the_triangles_that_unfused_arithmetic_accepts(backend: str, nodes: str) -> None:
     (vertices, faces), rays, both, _ = at_edges()
-    found = wive.Scene(vertices, faces, backend=backend, nodes=nodes).intersect_all(*rays)
+    found = wive.Scene(vertices, faces, backend=backend, nodes=nodes).intersect_all(*rays, touching=True)
     reported = found.prim.astype(np.int64) + len(faces) * np.repeat(
         np.arange(len(both)), np.diff(found.offsets)
     )
@@ -172,7 +172,7 @@ def test_slabs_without_their_slack_would_lose_triangles(place: tuple[float, ...]
     usable = [name for name, reason in _cpu.kernels().items() if not reason]
     for kernel in usable:
         limits = np.zeros(1, np.float32), np.full(1, np.inf, np.float32)
-        offsets, _, prim, _, _ = bvh.intersect_all(kernel, origins, directions, *limits)
+        offsets, _, prim, _, _ = bvh.intersect_all(kernel, origins, directions, *limits, touching=True)
         found = prim.astype(np.int64) + len(faces) * np.repeat(np.arange(len(aims)), np.diff(offsets))
         assert np.isin(triangle + len(faces) * ray, found).all()
 

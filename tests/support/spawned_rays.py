@@ -75,7 +75,7 @@ def own_hits(
     """The number of rays that hit the triangle they left, from the origins of `spawn`, or of hits.spawn."""
     count = 0
     for directions in ways_out(hits, incoming, flattest):
-        again = scene.intersect_all((spawn or hits.spawn)(directions), directions)
+        again = scene.intersect_all((spawn or hits.spawn)(directions), directions, touching=True)
         count += np.count_nonzero(again.prim == hits.prim[again.ray])
     return count
 
