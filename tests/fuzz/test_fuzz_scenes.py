@@ -75,8 +75,10 @@ def test_queries_agree_with_each_other(form: str, seeds: Iterator[int]) -> None:
         assert (hits.mask == scene.occluded(*rays)).all(), seed
         assert (hits.mask == (np.diff(many.offsets) > 0)).all(), seed
         first = many.offsets[:-1][hits.mask]
-        assert (many.prim[first] == hits.prim[hits.mask]).all(), seed
         assert (many.t[first] == hits.t[hits.mask]).all(), seed
+        # Several hits may round to the same t.
+        tied = (many.t == hits.t[many.ray]) & (many.prim == hits.prim[many.ray])
+        assert np.isin(np.flatnonzero(hits.mask), many.ray[tied]).all(), seed
         assert ((hits.t >= case.tmin) & (hits.t <= case.tmax))[hits.mask].all(), seed
         assert (scene.count(*rays) == np.diff(scene.intersect_all(*rays).offsets)).all(), seed
         for ray in np.flatnonzero(np.diff(many.offsets) > 1):

@@ -71,7 +71,7 @@ DOUBLE_REGISTERS = {
     ("fast", 8): 152,
     ("watertight", 8): 144,
     ("fast", 1): 120,
-    ("watertight", 1): 104,
+    ("watertight", 1): 112,
 }
 # Bytes: a thread that owns its stack holds a child and, for the closest hit, a distance per entry, and up to
 # eleven words of the ray behind them. A group's stack is in shared memory.

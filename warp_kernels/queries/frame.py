@@ -9,7 +9,7 @@ import warp as wp
 
 from wive.warp_kernels.lanes.layout import SIGN_BIT
 from wive.warp_kernels.lanes.precision import PRECISIONS
-from wive.warp_kernels.queries.limits import make_scale_limits
+from wive.warp_kernels.queries.limits import make_scale_limits, next_above
 
 MAX_COORDINATE = 1e18
 MAX_FLOAT = 3.4028234663852886e38
@@ -98,14 +98,6 @@ def component(v: wp.vec3, axis: int):
 @wp.func
 def component(v: wp.vec3d, axis: int):
     return wp.where(axis == 0, v[0], wp.where(axis == 1, v[1], v[2]))
-
-
-@wp.func
-def next_above(x: float):
-    """The next number above x, which is not infinity."""
-    bits = wp.cast(x, wp.int32)
-    smallest = wp.cast(1, wp.float32)
-    return wp.where(x == 0.0, smallest, wp.cast(wp.where(bits < 0, bits - 1, bits + 1), wp.float32))
 
 
 @wp.func

@@ -12,11 +12,48 @@ WORDS = {
 }
 
 
-def make_scale_limits(precision: str) -> wp.Function:
-    """The function that scales the limits of a ray of this precision."""
-    real, vec2 = PRECISIONS[precision].real, PRECISIONS[precision].vec2
+@wp.func
+def next_above(x: float):
+    """The next number above x, which is not infinity."""
+    bits = wp.cast(x, wp.int32)
+    smallest = wp.cast(1, wp.float32)
+    return wp.where(x == 0.0, smallest, wp.cast(wp.where(bits < 0, bits - 1, bits + 1), wp.float32))
+
+
+def make_largest_within(precision: str) -> wp.Function:
+    """The function (limit, unscale) that returns the largest t with t / unscale, rounded, not above limit."""
+    return _largest_within if precision == "float32" else _make_search(precision)
+
+
+# Numbers from here on round to infinity in float32.
+OVERFLOW = wp.constant(wp.float64(2.0**128 - 2.0**103))
+
+
+@wp.func
+def _largest_within(limit: float, unscale: float):
+    # Doubles hold the middle between two floats, and its product with a power of two, exactly. (The search of
+    # float64, which has no wider type, takes six registers more.)
+    if limit == wp.inf:
+        return limit
+    above = next_above(limit)
+    middle = wp.float64(0.5) * (wp.float64(limit) + wp.float64(above))
+    if limit == -wp.inf:
+        middle = -OVERFLOW
+    if above == wp.inf:
+        middle = OVERFLOW
+    # A middle is rounded to the even one of its neighbours; -infinity counts as even.
+    takes_middle = limit == -wp.inf or (wp.cast(limit, wp.uint32) & wp.uint32(1)) == wp.uint32(0)
+    product = middle * wp.float64(unscale)
+    t = wp.float32(product)
+    if wp.float64(t) > product or (wp.float64(t) == product and not takes_middle):
+        t = -next_above(-t)
+    return t
+
+
+def _make_search(precision: str) -> wp.Function:
+    real = PRECISIONS[precision].real
     word, sign_bit, infinity_bits, least_number, most_number = WORDS[precision]
-    sign, one, zero = word(sign_bit), word(1), real(0.0)
+    sign, one = word(sign_bit), word(1)
     # In the order of all numbers -infinity is at place 0.
     first, last = word(sign_bit - 1 - infinity_bits), word(2 * infinity_bits + 1)
     least, most = real(least_number), real(most_number)
@@ -27,7 +64,7 @@ def make_scale_limits(precision: str) -> wp.Function:
         bits = place + first
         return wp.cast(wp.where((bits & sign) != word(0), bits ^ sign, ~bits), real)
 
-    @wp.func(inline=False)
+    @wp.func
     def largest_within(limit: real, unscale: real):
         """The largest t with t / unscale <= limit."""
         product = limit * unscale
@@ -44,6 +81,16 @@ def make_scale_limits(precision: str) -> wp.Function:
             else:
                 high = middle - one
         return number_at(low)
+
+    return largest_within
+
+
+def make_scale_limits(precision: str) -> wp.Function:
+    """The function that scales the limits of a ray of this precision."""
+    real, vec2 = PRECISIONS[precision].real, PRECISIONS[precision].vec2
+    _, _, _, least_number, most_number = WORDS[precision]
+    zero, least, most = real(0.0), real(least_number), real(most_number)
+    largest_within = make_largest_within(precision)
 
     @wp.func
     def scale_limits(tmin: real, tmax: real, unscale: real):
