@@ -80,17 +80,10 @@ private:
     };
 
     // Starts the next ray that can hit anything, in the given flight; writes misses for the rays before it.
-    [[gnu::noinline]] void start_next_ray(State& f) {
+    void start_next_ray(State& f) {
         for (;; ++next_) {
             do {
-                if (packets_.has_split_rays()) [[unlikely]] {
-                    resume_split_ray(f);
-                    return;
-                }
-                if (next_ == end_ && !source_.take(next_, end_)) {
-                    end_ = next_;
-                    return;
-                }
+                if (next_ == end_ && !refill(f)) return;
             } while (packets_.trace_next(next_, end_));
             new (&f.query) Query{};  // in place: a temporary copied over would stall on its own stores
             f.counters = Counters{};
@@ -106,11 +99,19 @@ private:
         *ends_.node++ = &f;
     }
 
-    [[gnu::noinline]] void resume_split_ray(State& f) {
-        packets_.take_split_ray(f);
-        QueueEnds ends = ends_;
-        enqueue(bvh_, f, true, true, ends);
-        ends_ = ends;
+    // Takes more rays from the source. Returns false if there are none left, or if the flight got a ray of a split
+    // packet instead: while there are such rays, no other ray is next.
+    [[gnu::noinline]] bool refill(State& f) {
+        if (packets_.has_split_rays()) {
+            packets_.take_split_ray(f, next_);
+            QueueEnds ends = ends_;
+            enqueue(bvh_, f, true, true, ends);
+            ends_ = ends;
+            return false;
+        }
+        if (source_.take(next_, end_)) return true;
+        end_ = next_;
+        return false;
     }
 
     // Pops entries that lie behind the best hit (may_skip is false for the rest of a leaf, which is never skipped),

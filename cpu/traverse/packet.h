@@ -313,8 +313,8 @@ public:
           packet_(bvh, rays, hits) {}
 
     // Traces the rays from `next` on as a packet if there are enough and they are coherent; returns true then, with
-    // `next` moved past them. After a packet that was refused or not worthwhile, more and more rays are skipped before
-    // the next attempt.
+    // `next` moved past them, or to the end if the packet was split: its rays come before all others. After a packet
+    // that was refused or not worthwhile, more and more rays are skipped before the next attempt.
     [[gnu::always_inline]] bool trace_next(std::size_t& next, std::size_t end) {
         if (next < next_try_ || end - next < OnePacket::packet_size) return false;
         const auto outcome = packet_.trace(next);
@@ -326,16 +326,25 @@ public:
             next_try_ = next + pause_;
             pause_ = pause_ < longest_pause ? 2 * pause_ + OnePacket::packet_size : longest_pause;
         }
+        if (packet_.has_split_rays()) {
+            after_split_ = next;
+            next = end;
+        }
         return traced;
     }
 
-    [[gnu::always_inline]] bool has_split_rays() const { return packet_.has_split_rays(); }
-    void take_split_ray(auto& flight) { packet_.take_split_ray(flight); }
+    bool has_split_rays() const { return packet_.has_split_rays(); }
+    // Moves a ray of the split packet to a flight; after the last one `next` is the ray behind the packet again.
+    void take_split_ray(auto& flight, std::size_t& next) {
+        packet_.take_split_ray(flight);
+        if (!packet_.has_split_rays()) next = after_split_;
+    }
 
 private:
     static constexpr std::size_t longest_pause = 496;  // 16, 48, 112, 240, 496
 
     std::size_t next_try_, pause_ = 0;  // in rays
+    std::size_t after_split_ = 0;
     OnePacket packet_;
 };
 
@@ -343,7 +352,7 @@ struct NoPackets {
     [[gnu::always_inline]] NoPackets(const BvhView&, const auto&, const auto&, unsigned) {}
     [[gnu::always_inline]] static bool trace_next(std::size_t, std::size_t) { return false; }
     static constexpr bool has_split_rays() { return false; }
-    static void take_split_ray(auto&) {}
+    static void take_split_ray(auto&, std::size_t&) {}
 };
 
 }  // namespace wive::WIVE_ISA
