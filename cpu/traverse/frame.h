@@ -80,20 +80,22 @@ struct RayFrame {
         using Bits = std::conditional_t<sizeof(Real) == sizeof(float), std::uint32_t, std::uint64_t>;
         constexpr int mantissa = std::numeric_limits<Real>::digits - 1;
         constexpr Bits one = std::bit_cast<Bits>(Real{1}) >> mantissa;  // the exponent field of 1
-        const Bits exponent = std::bit_cast<Bits>(longest) >> mantissa;
-        unscale = std::bit_cast<Real>(exponent << mantissa);
-        Real4 scaled_direction = caller_direction * Real4::all(std::bit_cast<Real>((2 * one - exponent) << mantissa));
-        Real scaled_longest = longest * std::bit_cast<Real>((2 * one - exponent) << mantissa);
-        if (exponent - 1 >= 2 * one - 1) [[unlikely]] {
-            // The longest component is subnormal, or the reciprocal of its power of two is.
-            constexpr Real up = static_cast<Real>(Bits{1} << (mantissa + 1));  // makes any subnormal number normal
-            if (exponent == 0) {
-                const Bits normal_exponent = std::bit_cast<Bits>(longest * up) >> mantissa;
-                unscale = std::bit_cast<Real>(normal_exponent << mantissa) / up;
-            }
-            scaled_direction = caller_direction / Real4::all(unscale);
-            scaled_longest = longest / unscale;
+        // The power of two must be normal, and so must its reciprocal: other directions are scaled before.
+        Bits exponent = std::bit_cast<Bits>(longest) >> mantissa;
+        Real4 direction_in_range = caller_direction;
+        Real longest_in_range = longest, in_range_by = 1;
+        const bool is_extreme = exponent - 1 >= 2 * one - 1;
+        if (is_extreme) [[unlikely]] {
+            in_range_by = exponent == 0 ? static_cast<Real>(Bits{1} << (mantissa + 1)) : Real{0.5};
+            direction_in_range = caller_direction * Real4::all(in_range_by);
+            longest_in_range = longest * in_range_by;
+            exponent = std::bit_cast<Bits>(longest_in_range) >> mantissa;
         }
+        const Real scale = std::bit_cast<Real>((2 * one - exponent) << mantissa);
+        unscale = std::bit_cast<Real>(exponent << mantissa);
+        if (is_extreme) [[unlikely]]
+            unscale = unscale / in_range_by;
+        const Real4 scaled_direction = direction_in_range * Real4::all(scale);
         const Real near = caller_tmin * unscale, far = caller_tmax * unscale;
         interval = Interval<Real>::of(near, far);
 
@@ -102,7 +104,7 @@ struct RayFrame {
         const Float4 scaled = Float4::narrow(scaled_direction);  // signs are kept, even if a component becomes zero
         const Float4 relative = Float4::narrow(caller_origin - Real4::of(Float4::load(bvh.center)));
         const float magnitude = highest_lane(Float4::load(bvh.extent) + abs(relative)) + least_magnitude;
-        const float smallest = static_cast<float>(scaled_longest) * smallest_part;
+        const float smallest = static_cast<float>(longest_in_range * scale) * smallest_part;
         const Float4 size = Float4::all(1.0f) / max(abs(scaled), Float4::all(smallest));
         const Float4 reciprocal = flip_sign(size, scaled);
         const Float4 distance = relative * reciprocal, slack = size * Float4::all(magnitude * slack_factor);
