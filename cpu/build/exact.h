@@ -38,7 +38,10 @@ int sign_of_sum(const std::array<double, count>& terms) {
 inline int orientation(const double a[2], const double b[2], const double c[2]) {
     double size = 0, scale = 1;
     for (const double* p : {a, b, c}) size = std::max({size, std::abs(p[0]), std::abs(p[1])});
-    for (; size > 0 && size < 0x1p-300; size *= 0x1p300) scale *= 0x1p300;
+    while (size > 0 && size < 0x1p-300) {
+        size *= 0x1p300;
+        scale *= 0x1p300;
+    }
     std::array<double, 12> terms{};
     std::size_t count = 0;
     const auto add_product = [&](double x, double y) {  // the rounded product and its rounding error
