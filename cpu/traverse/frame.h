@@ -74,28 +74,18 @@ struct RayFrame {
         const unsigned in_range = less_equal(abs(caller_origin), Real4::all(max_coordinate<Real>)) &
                                   less_equal(lengths, Real4::all(std::numeric_limits<Real>::max()));
         const Real longest = highest_lane(lengths);
-        if ((in_range != 15u) | (longest == 0) | !(caller_tmin <= caller_tmax)) [[unlikely]]
-            return false;
-
+        // The power of two that scales the direction must be normal, and so must its reciprocal. Zero has no power.
         using Bits = std::conditional_t<sizeof(Real) == sizeof(float), std::uint32_t, std::uint64_t>;
         constexpr int mantissa = std::numeric_limits<Real>::digits - 1;
         constexpr Bits one = std::bit_cast<Bits>(Real{1}) >> mantissa;  // the exponent field of 1
-        // The power of two must be normal, and so must its reciprocal: other directions are scaled before.
-        Bits exponent = std::bit_cast<Bits>(longest) >> mantissa;
-        Real4 direction_in_range = caller_direction;
-        Real longest_in_range = longest, in_range_by = 1;
-        const bool is_extreme = exponent - 1 >= 2 * one - 1;
-        if (is_extreme) [[unlikely]] {
-            in_range_by = exponent == 0 ? static_cast<Real>(Bits{1} << (mantissa + 1)) : Real{0.5};
-            direction_in_range = caller_direction * Real4::all(in_range_by);
-            longest_in_range = longest * in_range_by;
-            exponent = std::bit_cast<Bits>(longest_in_range) >> mantissa;
+        const Bits exponent = std::bit_cast<Bits>(longest) >> mantissa;
+        if ((in_range != 15u) | (exponent - 1 >= 2 * one - 1) | !(caller_tmin <= caller_tmax)) [[unlikely]] {
+            if ((in_range != 15u) | (longest == 0) | !(caller_tmin <= caller_tmax)) return false;
+            return load_extreme(bvh, caller_origin, caller_direction, caller_tmin, caller_tmax);
         }
         const Real scale = std::bit_cast<Real>((2 * one - exponent) << mantissa);
         unscale = std::bit_cast<Real>(exponent << mantissa);
-        if (is_extreme) [[unlikely]]
-            unscale = unscale / in_range_by;
-        const Real4 scaled_direction = direction_in_range * Real4::all(scale);
+        const Real4 scaled_direction = caller_direction * Real4::all(scale);
         const Real near = caller_tmin * unscale, far = caller_tmax * unscale;
         interval = Interval<Real>::of(near, far);
 
@@ -104,7 +94,7 @@ struct RayFrame {
         const Float4 scaled = Float4::narrow(scaled_direction);  // signs are kept, even if a component becomes zero
         const Float4 relative = Float4::narrow(caller_origin - Real4::of(Float4::load(bvh.center)));
         const float magnitude = highest_lane(Float4::load(bvh.extent) + abs(relative)) + least_magnitude;
-        const float smallest = static_cast<float>(longest_in_range * scale) * smallest_part;
+        const float smallest = static_cast<float>(longest * scale) * smallest_part;
         const Float4 size = Float4::all(1.0f) / max(abs(scaled), Float4::all(smallest));
         const Float4 reciprocal = flip_sign(size, scaled);
         const Float4 distance = relative * reciprocal, slack = size * Float4::all(magnitude * slack_factor);
@@ -124,6 +114,20 @@ struct RayFrame {
         if (!scales_exactly(caller_tmin, caller_tmax, near, far))
             [[unlikely]]  // a call, so here, where no vector is live
             interval = scaled_limits(caller_tmin, caller_tmax, unscale);
+        return true;
+    }
+
+    // Loads a ray whose direction is subnormal, or so long that the reciprocal of its power of two is.
+    [[gnu::noinline]] bool load_extreme(const BvhView& bvh, Real4 caller_origin, Real4 caller_direction, Real tmin,
+                                        Real tmax) {
+        constexpr Real up = static_cast<Real>(std::uint64_t{1} << std::numeric_limits<Real>::digits);
+        const Real by = highest_lane(abs(caller_direction)) < 1 ? up : Real{0.5};
+        alignas(sizeof(Real4)) Real o[4], d[4];
+        caller_origin.store(o);
+        (caller_direction * Real4::all(by)).store(d);
+        if (!load(bvh, {o, d, &tmin, &tmax, 0, 0}, 0)) return false;
+        unscale /= by;
+        interval = scaled_limits(tmin, tmax, unscale);
         return true;
     }
 
