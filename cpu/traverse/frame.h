@@ -74,7 +74,7 @@ struct RayFrame {
         const unsigned in_range = less_equal(abs(caller_origin), Real4::all(max_coordinate<Real>)) &
                                   less_equal(lengths, Real4::all(std::numeric_limits<Real>::max()));
         const Real longest = highest_lane(lengths);
-        // The power of two that scales the direction must be normal, and so must its reciprocal. Zero has no power.
+        // The power of two that scales the direction, and its reciprocal, must be normal numbers. Zero has none.
         using Bits = std::conditional_t<sizeof(Real) == sizeof(float), std::uint32_t, std::uint64_t>;
         constexpr int mantissa = std::numeric_limits<Real>::digits - 1;
         constexpr Bits one = std::bit_cast<Bits>(Real{1}) >> mantissa;  // the exponent field of 1

@@ -87,7 +87,7 @@ private:
     static constexpr int start_cost = 4, node_cost = 3, leaf_cost = 3, skip_cost = 2, split_cost = 64, entry_cost = 3;
     // A packet is split when it has lost this many steps since it had saved most.
     static constexpr int most_lost_steps = 24;
-    // Single rays' steps per step of a packet from which on the next rays are traced as a packet too.
+    // A packet is worthwhile if its steps replace at least this many times their cost: the next rays form one as well.
     static constexpr struct {
         int num, den;
     } worthwhile_ratio = {3, 2};

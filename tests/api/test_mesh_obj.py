@@ -5,19 +5,13 @@ import struct
 import numpy as np
 import pytest
 from support.mesh_files import TRIANGLE
+from support.refusals import refusal
 
 import wive
 
 
 def load(text: str | bytes, dtype: type = np.float32):
     return wive.load_mesh(text.encode() if isinstance(text, str) else text, dtype, file_type="obj")
-
-
-def refusal(text: str | bytes) -> str:
-    with pytest.raises(ValueError) as error:
-        load(text)
-    assert "\n" not in str(error.value)
-    return str(error.value).removeprefix("mesh (bytes): ")
 
 
 V = TRIANGLE.decode()
@@ -159,11 +153,11 @@ REFUSED = {
 
 @pytest.mark.parametrize("text", REFUSED)
 def test_what_can_not_be_right_is_refused_with_its_line(text):
-    assert refusal(text).startswith(REFUSED[text])
+    assert refusal(text, "obj").startswith(REFUSED[text])
 
 
 def test_utf_16_that_is_not_is_refused():
-    assert "begins as UTF-16 text, and is not" in refusal(b"\xff\xfe" + V.encode() + b"\n")
+    assert "begins as UTF-16 text, and is not" in refusal(b"\xff\xfe" + V.encode() + b"\n", "obj")
 
 
 def test_unused_vertices_may_be_anything_and_larger_numbers_fit_float64():

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from support.mesh_files import POINTS, TRIANGLES, ply_binary, ply_header, ply_strips, ply_text
+from support.refusals import refusal
 
 import wive
 
@@ -13,13 +14,6 @@ INTEGERS = ("char", "uchar", "short", "ushort", "int", "uint")
 
 def load(data: bytes, dtype: type = np.float32):
     return wive.load_mesh(data, dtype, file_type="ply")
-
-
-def refusal(data: bytes) -> str:
-    with pytest.raises(ValueError) as error:
-        load(data)
-    assert "\n" not in str(error.value)
-    return str(error.value).removeprefix("mesh (bytes): ")
 
 
 def assert_is_the_mesh(data: bytes) -> None:
@@ -201,5 +195,5 @@ REFUSED = {
 
 @pytest.mark.parametrize(("data", "expected"), REFUSED.values(), ids=REFUSED)
 def test_what_can_not_be_right_is_refused_with_its_place(data, expected):
-    found = refusal(data)
+    found = refusal(data, "ply")
     assert found.startswith(expected)

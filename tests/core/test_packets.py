@@ -2,10 +2,10 @@
 
 from collections.abc import Callable
 from functools import partial
-from typing import NamedTuple
 
 import numpy as np
 import pytest
+from support.batches import Batch
 from support.closed_meshes import leaving, placed
 from support.doubles import survey
 from support.hard_sets import SETS, hard_set
@@ -15,17 +15,6 @@ from wive import _cpu
 
 KERNELS = [name for name, reason in _cpu.kernels().items() if not reason]
 TOGETHER = 16  # rays per packet (packet.h), and the fewest rays in flight for which packets are formed
-
-
-class Batch(NamedTuple):
-    """A mesh, rays (n,3), and their limits, of one element or n."""
-
-    vertices: np.ndarray
-    faces: np.ndarray
-    origins: np.ndarray
-    directions: np.ndarray
-    tmin: np.ndarray
-    tmax: np.ndarray
 
 
 def batch(mesh: tuple[np.ndarray, np.ndarray], origins: np.ndarray, directions: np.ndarray) -> Batch:

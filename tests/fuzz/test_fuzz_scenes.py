@@ -7,7 +7,8 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
-from support.odd_scenes import OddCase, odd_case
+from support.batches import Batch
+from support.odd_scenes import odd_case
 from support.oracle import truth
 
 import wive
@@ -24,12 +25,12 @@ FORMS = {
 MOST_EXACT = 9  # rays and triangles compared with fractions, which take a millisecond per pair
 
 
-def scene_of(case: OddCase, form: str, backend: str) -> wive.Scene:
+def scene_of(case: Batch, form: str, backend: str) -> wive.Scene:
     _, accuracy, nodes = FORMS[form]
     return wive.Scene(case.vertices, case.faces, backend=backend, accuracy=accuracy, nodes=nodes)
 
 
-def answers(scene: wive.Scene, case: OddCase, **work: int) -> dict[str, bytes]:
+def answers(scene: wive.Scene, case: Batch, **work: int) -> dict[str, bytes]:
     """Every query's results as bits."""
     rays = case.origins, case.directions, case.tmin, case.tmax
     hits, many = scene.intersect(*rays, **work), scene.intersect_all(*rays, **work)

@@ -1,10 +1,10 @@
 """Small scenes and rays of any bits: what no one would draw, but a broken file or program may pass."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
+from support.batches import Batch
 from support.closed_meshes import grid
 
 Random = np.random.Generator
@@ -30,25 +30,13 @@ SPECIAL = (
 )
 
 
-@dataclass(frozen=True)
-class OddCase:
-    """A mesh and rays with an interval each; finite vertices within the limit, rays of any bits."""
-
-    vertices: np.ndarray
-    faces: np.ndarray
-    origins: np.ndarray
-    directions: np.ndarray
-    tmin: np.ndarray
-    tmax: np.ndarray
-
-
-def odd_case(seed: int, dtype: type[np.floating], rays: int = 64) -> OddCase:
-    """The case of a seed."""
+def odd_case(seed: int, dtype: type[np.floating], rays: int = 64) -> Batch:
+    """The mesh and rays of a seed: finite vertices within the limit, rays of any bits, a limit each."""
     with np.errstate(all="ignore"):  # bits that overflow and are no numbers are wanted
         return _case(np.random.default_rng(seed), dtype, rays)
 
 
-def _case(random: Random, dtype: type[np.floating], rays: int) -> OddCase:
+def _case(random: Random, dtype: type[np.floating], rays: int) -> Batch:
     vertices, faces = odd_mesh(random, dtype)
     corners = vertices[faces]
     targets = points_of(corners, rays, random)
@@ -67,7 +55,7 @@ def _case(random: Random, dtype: type[np.floating], rays: int) -> OddCase:
     tmax = np.select([number < 0.7, number < 0.9], [np.inf, 1.0], tmin + random.random(rays)).astype(dtype)
     bad = random.random(rays) < 0.03
     directions[bad, random.integers(3)] = random.choice([np.nan, np.inf, 0.0])
-    return OddCase(vertices, faces, origins.astype(dtype), directions, tmin, tmax)
+    return Batch(vertices, faces, origins.astype(dtype), directions, tmin, tmax)
 
 
 def odd_mesh(random: Random, dtype: type[np.floating]) -> Mesh:

@@ -262,7 +262,7 @@ def vectors(name: str, value: ArrayLike, real: Real, may_be_one: bool = True) ->
     if array.ndim not in (1 if may_be_one else 2, 2) or array.shape[-1] != 3:
         one = ", or (3,) if all rays share it" if may_be_one else ""
         raise ValueError(f"{name} must have shape (n, 3){one}, got {array.shape}")
-    return _missing_if_masked(name, value, array, real)
+    return _missing_if_masked(value, array, real)
 
 
 def limits(name: str, value: ArrayLike, count: int, real: Real = FLOAT32) -> Floats:
@@ -272,7 +272,7 @@ def limits(name: str, value: ArrayLike, count: int, real: Real = FLOAT32) -> Flo
         raise ValueError(
             f"{name} must be one number or have shape ({count},), one per ray, got shape {array.shape}"
         )
-    return _missing_if_masked(name, value, array, real).reshape(-1)
+    return _missing_if_masked(value, array, real).reshape(-1)
 
 
 def _is_ready(value: ArrayLike, dtype: np.dtype[Any]) -> TypeGuard[Floats]:
@@ -341,7 +341,7 @@ def _numeric(
     return array
 
 
-def _missing_if_masked(name: str, value: ArrayLike, array: NDArray[Any], real: Real) -> Floats:
+def _missing_if_masked(value: ArrayLike, array: NDArray[Any], real: Real) -> Floats:
     """The array's numbers in `real`'s dtype, NaN if masked: such a ray misses."""
     mask = _mask(value)
     if mask is None:

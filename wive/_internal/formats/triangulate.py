@@ -8,7 +8,7 @@ share an edge still do.
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from wive._internal.formats.ears import Tangled, ears
 
 Ints = NDArray[np.int64]
+Integer = TypeVar("Integer", np.int32, np.int64)
 Floats = NDArray[np.float64]
 # Corners looked at together: their coordinates stay in the cache.
 BATCH = 1 << 15
@@ -44,6 +45,13 @@ def triangulate(vertices: NDArray[Any], sizes: Ints, corners: Ints, name: str) -
                     raise ValueError(f"{name}: {tangled}") from None
             out[triangle[which, None] + np.arange(size - 2)] = found
     return out
+
+
+def strip(corners: NDArray[Integer]) -> NDArray[Integer]:
+    """Triangles (n - 2, 3) of a strip of n corners, of which every other one winds the other way."""
+    found = np.stack([corners[:-2], corners[1:-1], corners[2:]], axis=1)
+    found[1::2] = found[1::2][:, [0, 2, 1]]
+    return found
 
 
 def _fan(size: int, begin: int = 0) -> Ints:

@@ -22,6 +22,7 @@ from wive._internal.formats.gltf.nodes import Drawn, Scene
 from wive._internal.formats.gltf.pose import default_weights, joint_matrices, morphed, skinned
 from wive._internal.formats.named import named
 from wive._internal.formats.placing import IDENTITY, Part, check_counts, joined
+from wive._internal.formats.triangulate import strip
 
 LISTS, FAN = 4, 6  # modes; 5 is a strip
 Shape = tuple[NDArray[Any], NDArray[np.int32]]  # positions and corners of a primitive, in its mesh
@@ -172,6 +173,4 @@ def triangles(document: Document, primitive: Primitive) -> NDArray[np.int32]:
         return order.reshape(-1, 3)
     if primitive.mode == FAN:
         return np.stack([order[1:-1], order[2:], np.broadcast_to(order[:1], len(order) - 2)], axis=1)
-    corners = np.stack([order[:-2], order[1:-1], order[2:]], axis=1)
-    corners[1::2] = corners[1::2][:, [0, 2, 1]]  # every other triangle of a strip winds the other way
-    return corners
+    return strip(order)
