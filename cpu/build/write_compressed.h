@@ -17,7 +17,8 @@ struct CompressedWriter {
     using Node = CompressedNode;
     using Block = CompressedBlock;
 
-    // Every box of `out` contains that of `node`, in exact arithmetic. children: the number of lanes used.
+    // Every box of `out` contains that of `node`, in exact arithmetic, and slack for the rounding of its own planes.
+    // children: the number of lanes used.
     static void write_node(const wive::Node& node, int children, Node& out);
     // The size of a leaf over these prims, at most max_compressed_leaf of them.
     static LeafSize leaf_size(const Mesh<float>& mesh, std::span<const std::uint32_t> prims);

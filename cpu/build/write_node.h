@@ -20,16 +20,25 @@ namespace wive {
 // overflows.
 inline constexpr float empty_plane = 1e24f;
 
-// Writes a child's box. An empty one becomes the inverted box that nothing hits.
+// The part of the boxes' slack that is due to their planes, per largest |plane| of a box: 17u, so that at least 16u are
+// left when the difference is rounded (traverse/frame.h). A box inside another stays inside: rounding is monotonic.
+inline constexpr float plane_slack_factor = 0x1.1p-20f;
+
+// Writes a child's box with its slack. An empty one becomes the inverted box that nothing hits.
 inline void write_box(Node& node, int lane, const Box& box, const std::array<float, 3>& center) {
     const bool empty = !(box.lo[0] <= box.hi[0]);
+    float low[3], high[3], largest = 0;
     for (int axis = 0; axis < 3; ++axis) {
         const float c = center[static_cast<std::size_t>(axis)];
-        const float low = empty ? empty_plane : plane_below(box.lo[axis], c);
-        const float high = empty ? -empty_plane : plane_above(box.hi[axis], c);
-        assert(std::isfinite(low) && std::isfinite(high));  // check_mesh refuses coordinates beyond max_coordinate
-        node.planes[low_row(axis)][lane] = low;
-        node.planes[high_row(axis)][lane] = high;
+        low[axis] = empty ? empty_plane : plane_below(box.lo[axis], c);
+        high[axis] = empty ? -empty_plane : plane_above(box.hi[axis], c);
+        assert(std::isfinite(low[axis]) && std::isfinite(high[axis]));  // coordinates are at most max_coordinate
+        largest = std::max({largest, -low[axis], high[axis]});
+    }
+    const float slack = largest * plane_slack_factor;
+    for (int axis = 0; axis < 3; ++axis) {
+        node.planes[low_row(axis)][lane] = low[axis] - slack;
+        node.planes[high_row(axis)][lane] = high[axis] + slack;
     }
 }
 

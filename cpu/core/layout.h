@@ -28,8 +28,8 @@ constexpr int high_row(int axis) { return 2 * axis + 1; }
 inline constexpr int octants = 8;
 inline constexpr int order_bits = 4;
 
-// An inner node: eight rows of eight lanes, one lane per child. Planes are relative to BvhView::center and rounded
-// outwards. The order of octant 7 - o is the reverse of octant o's. Lanes without a child hold an inverted box that
+// An inner node: eight rows of eight lanes, one lane per child. Planes are relative to BvhView::center and moved outwards
+// by the slack of write_node.h. The order of octant 7 - o is the reverse of octant o's. Lanes without a child hold an inverted box that
 // nothing hits.
 struct alignas(64) Node {
     float planes[plane_rows][node_width];
@@ -112,7 +112,7 @@ inline constexpr int accuracy_count = 3;
 struct BvhView {
     const std::byte* units;       // begins with the root, which is always an inner node
     alignas(16) float center[4];  // planes are relative to this point; lane 3 is zero
-    alignas(16) float extent[4];  // the largest |plane| on each axis; lane 3 is zero
+    alignas(16) float extent[4];  // the largest |coordinate - center| on each axis; lane 3 is zero
 
     // child must be inner: no bits need to be masked off then.
     template <class Form>

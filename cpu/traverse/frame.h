@@ -26,15 +26,17 @@ namespace wive::WIVE_ISA {
 //
 // Slabs are conservative at no cost to the loop. With planes p and origin o relative to the tree's centre, the
 // distance to a plane is computed as fma(p, r, bias), r = 1/d and bias = -o r -+ slack, where, in the roundoff
-// u = 2^-24, P the tree's extent and O = |o| on that axis, the errors add up, as lengths along the axis, to
+// u = 2^-24, P = |p| and O = |o| on that axis, the errors add up, as lengths along the axis, to
 //     2u(P + O)  from r and from o r,      u(2P + 2O)  from rounding bias and result,
 //     u O        from o = origin - centre, u P         if there is no fused multiply-add,
 // and the triangle test (triangle_watertight.h) moves a vertex sideways by at most 6u max(P + O). All of it is
-// below 12u M, M = max over the axes of (P + O); slack = |r| 16u M covers it. The near distance is lowered and the far
-// distance raised by it, so no box that holds a triangle the test accepts is ever missed.
+// below 12u M, M = max over the axes of P, of any of the box's planes, + max over the axes of O. The planes of a node
+// are 16u max P outside the box (build/write_node.h), and slack = |r| 16u max O: no box that holds a triangle the test
+// accepts is ever missed, and how small a box can be told apart depends on where it lies, not on the tree's extent.
 // Compressed planes (compressed_slabs.h) are met at fma(byte, step r, fma(origin, r, bias)). step r is exact, the step
 // being a power of two far from underflow; rounding the inner sum adds u(P + O), and the product of the byte 2u P if
-// there is no fused multiply-add. Such planes may lie up to a step outside, which is below P / 60: 15u M in all.
+// there is no fused multiply-add, P here being that of the whole node, by which its planes are moved once more. Such
+// planes may lie up to a step outside, which is below P / 60: 15u M in all.
 // A float64 ray meets the same boxes, all of this in float: its direction is rounded, which adds u(P + O) from r; o =
 // origin - centre is taken in double, so that its one rounding to float is the u O above. The triangle tests move
 // vertices sideways by multiples of 2^-53 M; if rounding of the weights would move a hit by more, they are computed
@@ -93,7 +95,7 @@ struct RayFrame {
         constexpr float least_magnitude = 0x1p-100f;             // keeps the slack from vanishing if everything is tiny
         const Float4 scaled = Float4::narrow(scaled_direction);  // signs are kept, even if a component becomes zero
         const Float4 relative = Float4::narrow(caller_origin - Real4::of(Float4::load(bvh.center)));
-        const float magnitude = highest_lane(Float4::load(bvh.extent) + abs(relative)) + least_magnitude;
+        const float magnitude = highest_lane(abs(relative)) + least_magnitude;
         const float smallest = static_cast<float>(longest * scale) * smallest_part;
         const Float4 size = Float4::all(1.0f) / max(abs(scaled), Float4::all(smallest));
         const Float4 reciprocal = flip_sign(size, scaled);

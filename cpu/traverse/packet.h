@@ -93,8 +93,9 @@ private:
     } worthwhile_ratio = {3, 2};
 
     // The largest difference between the rays' directions, relative to their longest component, and between their
-    // origins, relative to the tree's extent.
-    static constexpr float max_turn = 1.0f / 8, max_shift = 1.0f / 16;
+    // origins, relative to the tree's extent; and how wide the rays may be apart at the tree's centre, relative to
+    // that.
+    static constexpr float max_turn = 1.0f / 8, max_shift = 1.0f / 16, max_width = 3.0f / 8;
 
     // An entry of the stack of a split packet: the rays that meet the child's box, and where.
     struct Entry {
@@ -123,9 +124,11 @@ private:
             high_direction = max(high_direction, direction);
         }
         const Real longest = highest_lane(max(abs(low_direction), abs(high_direction)));
-        const float extent = highest_lane(Float4::load(bvh_.extent));
-        return (highest_lane(high_direction - low_direction) <= max_turn * longest) &
-               (highest_lane(high_origin - low_origin) <= max_shift * extent);
+        const Real turn = highest_lane(high_direction - low_direction);
+        const Real extent = highest_lane(Float4::load(bvh_.extent));
+        const Real distance = highest_lane(abs(low_origin - Real4::of(Float4::load(bvh_.center))));
+        return (turn <= max_turn * longest) & (highest_lane(high_origin - low_origin) <= max_shift * extent) &
+               (turn * distance <= max_width * extent * longest);
     }
 
     // Returns false if a ray hits nothing by rule, or if the rays differ in octant or in scale, which would make the
@@ -160,7 +163,9 @@ private:
 
     void set_bounds(Float4 low_rdir, Float4 high_rdir, Float4 low_origin, Float4 high_origin, Float4 extent) {
         constexpr float least_magnitude = 0x1p-100f, slack_factor = 0x1p-18f;  // 64u; as in frame.h, u = 2^-24
-        const float magnitude = highest_lane(extent + max(abs(low_origin), abs(high_origin))) + least_magnitude;
+        Float4 magnitudes = max(abs(low_origin), abs(high_origin));
+        if constexpr (!Triangles<I>::hits_are_in_boxes) magnitudes = magnitudes + extent;
+        const float magnitude = highest_lane(magnitudes) + least_magnitude;
         const Float4 slack = Float4::all(magnitude * slack_factor);
         alignas(16) float rdir[2][4], behind[4], ahead[4];
         low_rdir.store(rdir[0]);
@@ -341,9 +346,11 @@ public:
     }
 
 private:
-    static constexpr std::size_t longest_pause = 496;  // 16, 48, 112, 240, 496
+    static constexpr std::size_t longest_pause = 2032;  // 16, 48, 112, 240 and so on
+    // Until a packet was worthwhile: what the tries of a batch of few rays lose would be a large part of its time.
+    static constexpr std::size_t first_pause = 112;
 
-    std::size_t next_try_, pause_ = 0;  // in rays
+    std::size_t next_try_, pause_ = first_pause;  // in rays
     std::size_t after_split_ = 0;
     OnePacket packet_;
 };

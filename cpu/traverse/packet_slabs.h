@@ -16,8 +16,9 @@ struct PacketBounds {
 // A ray with origin o and reciprocal r meets a plane p at (p - o) r. Over all rays of the packet this is least for the
 // origin farthest ahead and for the lowest or the highest r, because it is linear in r. So the lesser of the two
 // distances is no later than any ray's entry, and the greater of the two from the origin farthest behind is no sooner
-// than any ray's exit. That holds for what the rays compute (frame.h), whose slack and rounding add up to at most 23u M
-// against 5u M for the two lines here, because the origins are moved by 64u M (packet.h).
+// than any ray's exit. Rounding here is that of a single ray, so the slack of frame.h is enough for every hit that lies
+// in its leaf's box. Other hits (concepts.h) depend on what each ray computes, whose slack and rounding add up to at
+// most 23u M against 5u M for the two lines here: the origins are moved by 64u M then (packet.h).
 template <Isa I, NodeLayout<I> L>
 struct PacketSlabs {
     using Layout = L;

@@ -17,6 +17,7 @@ from wive import _cpu
 Mesh = tuple[np.ndarray, np.ndarray]
 LEAF = 1 << 31
 SLACK = np.float32(2.0**-20)
+PLANE_SLACK = np.float32(17 * 2.0**-24)  # cpu/build/write_node.h
 
 
 def edge_function(a: np.ndarray, b: np.ndarray, fused: bool) -> np.ndarray:
@@ -125,15 +126,21 @@ def boxes_above(bvh: _cpu.Bvh, triangles: int) -> np.ndarray:
 def reached(
     bvh: _cpu.Bvh, slots: np.ndarray, origins: np.ndarray, directions: np.ndarray, slack: np.float32
 ) -> np.ndarray:
-    """Whether the slab test of each ray hits all boxes (n,d) on its way; slots of -1 count as hit."""
+    """Whether the slab test of each ray hits all boxes (n,d) on its way; slots of -1 count as hit.
+
+    slack: that of the rays, per size of the origin; if it is 0, that of the planes is taken out as well.
+    """
     lo, hi = (
         bvh.nodes[:, rows].view(np.float32).transpose(0, 2, 1).reshape(-1, 3)[slots]
         for rows in ([0, 2, 4], [1, 3, 5])
     )
+    if slack == 0:
+        inwards = np.maximum(-lo, hi).max(axis=-1, keepdims=True) * PLANE_SLACK
+        lo, hi = lo + inwards, hi - inwards
     longest = np.abs(directions).max(axis=1, keepdims=True)
     scaled = np.ldexp(directions, 1 - np.frexp(longest)[1]).astype(np.float32)
     relative = origins - bvh.center
-    magnitude = (bvh.extent + np.abs(relative)).max(axis=1, keepdims=True)
+    magnitude = np.abs(relative).max(axis=1, keepdims=True)
     size = np.float32(1) / np.maximum(
         np.abs(scaled), np.abs(scaled).max(axis=1, keepdims=True) * np.float32(2.0**-30)
     )

@@ -71,7 +71,7 @@ def make_functions(
         a fast one (`FastBvh`) or of an exact one (`ExactBvh`). It has no gradient: `differentiable_hit` has.
         """
         hit = _miss()
-        ray = load_frame(bvh.center, bvh.extent, origin, direction, tmin, tmax)
+        ray = load_frame(bvh.center, origin, direction, tmin, tmax)
         if ray.valid and not _refused(bvh.error, bvh.stack, bvh.accuracy, wanted, bvh.refusal):
             best = trace_closest(bvh, ray, 0, begin_closest(ray)).found
             if best.prim != NO_PRIM:
@@ -87,7 +87,7 @@ def make_functions(
 
         It takes the same handles and has no gradient.
         """
-        ray = load_frame(bvh.center, bvh.extent, origin, direction, tmin, tmax)
+        ray = load_frame(bvh.center, origin, direction, tmin, tmax)
         hit = bool(False)
         if ray.valid and not _refused(bvh.error, bvh.stack, bvh.accuracy, wanted, bvh.refusal):
             hit = trace_any(bvh, ray, 0, begin_any(ray)).found.prim != NO_PRIM
@@ -99,7 +99,7 @@ def make_functions(
 
         It takes the same handles as `closest_hit` and has no gradient.
         """
-        ray = load_frame(bvh.center, bvh.extent, origin, direction, tmin, tmax)
+        ray = load_frame(bvh.center, origin, direction, tmin, tmax)
         hits = int(0)
         if ray.valid and not _refused(bvh.error, bvh.stack, bvh.accuracy, wanted, bvh.refusal):
             hits = trace_count(bvh, ray, 0, begin_count(ray)).found.count

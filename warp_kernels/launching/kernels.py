@@ -75,7 +75,7 @@ def make_kernel(
         i: int,
     ) -> frame_type:
         return load_frame(
-            tree.center, tree.extent, origins[i], directions[i], value_of(tmin, i), value_of(tmax, i)
+            tree.center, origins[i], directions[i], value_of(tmin, i), value_of(tmax, i)
         )
 
     @wp.func

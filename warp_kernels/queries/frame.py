@@ -159,8 +159,8 @@ def make_load_frame(accuracy: str, precision: str) -> wp.Function:
     max_component = real(MAX_DOUBLE if double else MAX_FLOAT)
 
     @wp.func
-    def load_frame(center: wp.vec3, extent: wp.vec3, origin: vec3, direction: vec3, tmin: real, tmax: real):
-        """The frame of a ray in a tree with this center and extent."""
+    def load_frame(center: wp.vec3, origin: vec3, direction: vec3, tmin: real, tmax: real):
+        """The frame of a ray in a tree with this center."""
         ray = frame_type()
         lengths = vec3(wp.abs(direction[0]), wp.abs(direction[1]), wp.abs(direction[2]))
         longest = wp.max(wp.max(lengths[0], lengths[1]), lengths[2])
@@ -195,7 +195,7 @@ def make_load_frame(accuracy: str, precision: str) -> wp.Function:
 
         magnitude = float(0.0)
         for axis in range(3):
-            magnitude = wp.max(magnitude, extent[axis] + wp.abs(relative[axis]))
+            magnitude = wp.max(magnitude, wp.abs(relative[axis]))
         magnitude = magnitude + LEAST_MAGNITUDE
         smallest = wp.float32(longest / ray.unscale) * SMALLEST_PART
         for axis in range(3):

@@ -29,7 +29,6 @@ class Bvh:
     units: wp.array(dtype=wp.float32)  # nodes, then triangle blocks
     error: wp.array(dtype=wp.int32)  # one word: 0, or why results can't be trusted
     center: wp.vec3
-    extent: wp.vec3
     step_limit: wp.int32  # no traversal of a sound tree takes more steps
     stack: wp.int32  # stack size that a traversal may need
     accuracy: wp.int32  # index into ACCURACIES: a handle of another type has another
