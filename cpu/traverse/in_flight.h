@@ -10,6 +10,7 @@
 #include <new>
 #include <type_traits>
 
+#include "traverse/box_misses.h"
 #include "traverse/packet.h"
 #include "traverse/traversal.h"
 
@@ -49,6 +50,7 @@ public:
           hits_(hits),
           source_(source),
           packets_(packets),
+          misses_(bvh, rays),
           flights_(reinterpret_cast<State*>(scratch)) {}
 
     // Traces the rays of the source until it is empty.
@@ -84,10 +86,10 @@ private:
         for (;; ++next_) {
             do {
                 if (next_ == end_ && !refill(f)) return;
-            } while (packets_.trace_next(next_, end_));
+            } while (!misses_.has(next_, end_) && packets_.trace_next(next_, end_));
             new (&f.query) Query{};  // in place: a temporary copied over would stall on its own stores
             f.counters = Counters{};
-            if (f.ray.load(bvh_, rays_, next_)) break;
+            if (!misses_.has(next_, end_) && f.ray.load(bvh_, rays_, next_)) break;
             f.query.write(hits_, next_, 1);
             f.counters.write(hits_, next_);
         }
@@ -215,6 +217,7 @@ private:
     const Hits hits_;
     const RaySource source_;
     PacketsOrNone& packets_;
+    std::conditional_t<std::is_same_v<Counters, NoCounters>, BoxMisses<I, Layout>, NoMisses> misses_;
     State* flights_;
     // One more than the flights, because entries are also written past the ends.
     State *node_queue_[max_in_flight + 1], *leaf_queue_[max_in_flight + 1], *done_queue_[max_in_flight + 1];

@@ -1,0 +1,125 @@
+// Rays that miss the box around the whole tree, found four at a time before anything else is computed of them.
+#pragma once
+
+#include <algorithm>
+#include <bit>
+#include <cassert>
+#include <cstddef>
+
+#include "core/layout.h"
+#include "core/ray.h"
+#include "traverse/concepts.h"
+
+namespace wive::WIVE_ISA {
+
+// A ray from outside that misses costs as much as several nodes: it is loaded, queued and written. So blocks of rays
+// are tested first, as long as some of them miss; then more and more rays are taken untested before the next block.
+template <Isa I, NodeLayout<I> Layout>
+class BoxMisses {
+    using Real = typename I::Real;
+    using Real4 = typename I::Real4;
+    using Float4 = typename I::Float4;
+
+public:
+    BoxMisses(const BvhView& bvh, const RayBatch<Real>& rays) : bvh_(bvh), rays_(rays) {}
+
+    // Whether ray i, before `end`, is known to miss. Rays are asked for in ascending order.
+    [[gnu::always_inline]] bool has(std::size_t i, std::size_t end) {
+        if (i < next_try_) return false;
+        if (i >= block_end_ && !test_block(i, end)) return false;
+        return misses_ >> (i - (block_end_ - block_size)) & 1u;
+    }
+
+private:
+    static constexpr unsigned block_size = 16;
+    static constexpr int worthwhile_misses = 4;  // of a block
+    static constexpr std::size_t longest_pause = 2032;
+
+    [[gnu::noinline]] bool test_block(std::size_t first, std::size_t end) {
+        if (end - first < block_size) return false;
+        if (block_end_ == 0) find_box();
+        misses_ = 0;
+        for (unsigned i = 0; i < block_size; i += 4) misses_ |= misses_of_four(first + i) << i;
+        block_end_ = first + block_size;
+        if (std::popcount(misses_) >= worthwhile_misses) {
+            pause_ = 0;
+        } else {
+            pause_ = pause_ < longest_pause ? 2 * pause_ + block_size : longest_pause;
+            next_try_ = block_end_ + pause_;
+        }
+        return true;
+    }
+
+    // The box of the root's children, which has the slack of their planes.
+    void find_box() {
+        const auto& root = bvh_.template node<Layout>(inner_child(0));
+        for (int axis = 0; axis < 3; ++axis) {
+            double low = 0, high = 0;
+            bool is_first = true;
+            for (int lane = 0; lane < node_width; ++lane) {
+                if (root.child[lane] == end_of_stack) continue;
+                const double lane_low = root.plane(low_row(axis), lane), lane_high = root.plane(high_row(axis), lane);
+                low = is_first ? lane_low : std::min(low, lane_low);
+                high = is_first ? lane_high : std::max(high, lane_high);
+                is_first = false;
+            }
+            middle_[axis] = static_cast<float>(0.5 * (low + high));
+            half_[axis] = static_cast<float>(0.5 * (high - low));
+            largest_ = std::max({largest_, static_cast<float>(-low), static_cast<float>(high)});
+        }
+    }
+
+    // The mask of those of rays [first, first + 4) that miss the box. A line misses it if it is farther from its middle
+    // than the box reaches, seen along one of the axes: no division. A ray also misses if it starts outside and leads
+    // away. Relative to the tree's centre, with O the origin's and P the planes' largest coordinate, rounding and the
+    // triangle test (frame.h) add up to less than 20u (O + P); the box is enlarged by 32u (O + P). Components of the
+    // direction count as at least 2^-30 of the longest; so underflow is less than that slack if (O + P) times the
+    // longest is in range.
+    unsigned misses_of_four(std::size_t first) const {
+        constexpr float slack_factor = 0x1p-19f, smallest_part = 0x1p-30f, least = 0x1p-90f, most = 0x1p120f;
+        const auto load = [](const Real* from, std::size_t stride) {
+            return Real4::set(from[0], from[stride], from[2 * stride], from[3 * stride]);
+        };
+        const Real *origins = rays_.origins + 3 * first, *directions = rays_.directions + 3 * first;
+        Float4 origin[3], direction[3], size[3], reach[3];
+        Float4 distance = Float4::all(0), longest = distance;
+        for (unsigned axis = 0; axis < 3; ++axis) {
+            origin[axis] = Float4::narrow(load(origins + axis, 3) - Real4::all(Real{bvh_.center[axis]}));
+            direction[axis] = Float4::narrow(load(directions + axis, 3));
+            distance = max(distance, abs(origin[axis]));
+            longest = max(longest, abs(direction[axis]));
+        }
+        distance = distance + Float4::all(largest_);
+        for (unsigned axis = 0; axis < 3; ++axis) {
+            origin[axis] = origin[axis] - Float4::all(middle_[axis]);
+            size[axis] = max(abs(direction[axis]), longest * Float4::all(smallest_part));
+            reach[axis] = Float4::all(half_[axis]) + distance * Float4::all(slack_factor);
+        }
+        const std::size_t stride = rays_.tmin_stride;
+        const unsigned ahead = less_equal(Real4::all(0), load(rays_.tmin + first * stride, stride));
+        unsigned misses = 0;
+        for (unsigned axis = 0; axis < 3; ++axis) {
+            const unsigned a = (axis + 1) % 3, b = (axis + 2) % 3;
+            misses |=
+                less(size[a] * reach[b] + size[b] * reach[a], abs(origin[a] * direction[b] - origin[b] * direction[a]));
+            misses |=
+                ahead & less(reach[axis], abs(origin[axis])) & ~(sign_bits(origin[axis]) ^ sign_bits(direction[axis]));
+        }
+        const Float4 magnitude = distance * longest;
+        return misses & less_equal(Float4::all(least), magnitude) & less_equal(magnitude, Float4::all(most)) & 15u;
+    }
+
+    const BvhView bvh_;
+    const RayBatch<Real> rays_;
+    float middle_[3], half_[3], largest_ = 0;
+    std::size_t next_try_ = 0, block_end_ = 0, pause_ = 0;
+    unsigned misses_ = 0;  // of the block before block_end_
+};
+
+// For kernels that count the steps of each ray.
+struct NoMisses {
+    [[gnu::always_inline]] NoMisses(const BvhView&, const auto&) {}
+    [[gnu::always_inline]] static bool has(std::size_t, std::size_t) { return false; }
+};
+
+}  // namespace wive::WIVE_ISA
