@@ -137,6 +137,7 @@ struct RayFrame {
     // nearly subnormal or, on the wrong side, infinite.
     [[gnu::always_inline]] static bool scales_exactly(Real tmin, Real tmax, Real near, Real far) {
         constexpr Real least = 2 * std::numeric_limits<Real>::min(), most = std::numeric_limits<Real>::max();
+        if ((tmin == 0) & (tmax > most)) return true;  // the usual limits, for which two comparisons are enough
         return ((tmin == 0) | ((tmin >= least) & (near >= least) & (near <= most))) & (tmax >= least) & (far >= least);
     }
 

@@ -84,12 +84,14 @@ private:
     // Starts the next ray that can hit anything, in the given flight; writes misses for the rays before it.
     void start_next_ray(State& f) {
         for (;; ++next_) {
+            bool misses = false;
             do {
                 if (next_ == end_ && !refill(f)) return;
-            } while (!misses_.has(next_, end_) && packets_.trace_next(next_, end_));
+                misses = misses_.has(next_, end_);
+            } while (!misses && packets_.trace_next(next_, end_));
             new (&f.query) Query{};  // in place: a temporary copied over would stall on its own stores
             f.counters = Counters{};
-            if (!misses_.has(next_, end_) && f.ray.load(bvh_, rays_, next_)) break;
+            if (!misses && f.ray.load(bvh_, rays_, next_)) break;
             f.query.write(hits_, next_, 1);
             f.counters.write(hits_, next_);
         }
