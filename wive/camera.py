@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from wive._internal import arguments
+from wive._internal.scalars import shown
 
 # A mesh is flat, with up along its thinnest axis, if it is this much thinner on that axis than on the others.
 FLATNESS = 0.4
@@ -105,11 +106,11 @@ class Camera:
                 raise ValueError(f"{name} must be at most {LARGEST:.3g} in magnitude, got {end.tolist()}")
         eye, target = ends
         if (eye == target).all():
-            raise ValueError(f"eye and target must differ, got {self.eye!r} for both")
+            raise ValueError(f"eye and target must differ, got {shown(self.eye)} for both")
         forward = _unit(target - eye)
         right = np.cross(forward, _direction("up", self.up))
         if np.linalg.norm(right) <= SMALLEST_ANGLE:
-            raise ValueError(f"up must not be zero or along the view, got {self.up!r}")
+            raise ValueError(f"up must not be zero or along the view, got {shown(self.up)}")
         right /= np.linalg.norm(right)
         return np.stack([forward, right, np.cross(right, forward)])
 
@@ -125,7 +126,7 @@ def _direction(name: str, value: ArrayLike) -> NDArray[np.float64]:
     """A unit vector along `value`."""
     vector = arguments.vector(name, value)
     if not vector.any():
-        raise ValueError(f"{name} must not be zero or along the view, got {value!r}")
+        raise ValueError(f"{name} must not be zero or along the view, got {shown(value)}")
     return _unit(vector)
 
 

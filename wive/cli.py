@@ -56,6 +56,14 @@ class _Parser(argparse.ArgumentParser):
         self.exit(BAD_INPUT, f"wive: error: {message} (see {self.prog} --help)\n")
 
 
+class _Defaults(argparse.ArgumentDefaultsHelpFormatter):
+    """Help with the default of each option that has one and doesn't tell it itself."""
+
+    def _get_help_string(self, action: argparse.Action) -> str | None:
+        has_one = action.default is not None and action.default is not False
+        return super()._get_help_string(action) if has_one else action.help
+
+
 def _parser() -> argparse.ArgumentParser:
     parser = _Parser(prog="wive", description="Fast ray queries on triangle meshes.")
     parser.add_argument("--version", action="version", version=f"wive {wive.__version__}")
@@ -75,7 +83,7 @@ def _add_render(subparsers: "argparse._SubParsersAction[_Parser]") -> None:
         "render",
         help="path-trace a picture of a mesh",
         description="Path-trace a picture of a mesh: diffuse surfaces under a white sky.",
-        formatter_class=argparse.ArgumentDefaultsHelpFormatter,
+        formatter_class=_Defaults,
     )
     parser.add_argument("mesh", nargs="?", metavar="MESH", help="mesh file; default: real terrain")
     parser.add_argument("-o", "--output", default="wive.png", metavar="PNG", help="picture to write")
@@ -112,7 +120,7 @@ def _add_trace(subparsers: "argparse._SubParsersAction[_Parser]") -> None:
         help="closest hits of rays from a file, or all",
         description="Find the closest hit of each ray; write arrays t, prim and uv. With --all, find every "
         "hit: those of ray i are rows offsets[i] to offsets[i+1], by ascending t.",
-        formatter_class=argparse.ArgumentDefaultsHelpFormatter,
+        formatter_class=_Defaults,
     )
     parser.add_argument("mesh", metavar="MESH", help="mesh file")
     parser.add_argument(
@@ -144,7 +152,7 @@ def _add_info(subparsers: "argparse._SubParsersAction[_Parser]") -> None:
     parser = subparsers.add_parser(
         "info",
         help="a mesh and its tree in numbers",
-        formatter_class=argparse.ArgumentDefaultsHelpFormatter,
+        formatter_class=_Defaults,
     )
     parser.add_argument("mesh", metavar="MESH", help="mesh file")
     _add_scene_options(parser, threads=False)

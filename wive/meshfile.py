@@ -10,9 +10,11 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from wive._internal.files import PathLike
+from wive._internal.files import PathLike, named_error
 from wive._internal.formats import Mesh
-from wive._internal.formats.kinds import kind_of
+from wive._internal.formats.kinds import compression_of, kind_of
+from wive._internal.formats.unread import unread
+from wive._internal.lines import one_line
 from wive._internal.npzfile import check_input
 from wive._internal.precision import FLOAT32, Floats, Real, real_named
 from wive._internal.storage import refuse_saved_scene
@@ -58,6 +60,8 @@ def load_mesh(
     kind = kind_of(data, name, file_type)
     if not data:
         raise ValueError(f"{name}: is empty")
+    if packed := compression_of(data):
+        raise unread(name, packed)
     refuse_saved_scene(name, data)
     return _checked(_read(kind, data, name, folder, real), name, real)
 
@@ -65,21 +69,35 @@ def load_mesh(
 def _content(source: MeshSource) -> tuple[str, str | None, bytes]:
     """Name for errors, folder if the file has one, content."""
     if isinstance(source, str | os.PathLike):
-        name = check_input(source)
-        with open(name, "rb") as file:
-            return name, os.path.dirname(os.path.abspath(name)), file.read()
+        path = check_input(source)
+        with open(path, "rb") as file:
+            return one_line(path), os.path.dirname(os.path.abspath(path)), file.read()
     if isinstance(source, bytes | bytearray | memoryview):
         return "mesh (bytes)", None, bytes(source)
     if not callable(getattr(source, "read", None)):
         raise TypeError(f"source must be a path, bytes or a file object, got {type(source).__name__}")
     named = getattr(source, "name", None)  # a number if the file was opened by its descriptor
-    name = named if isinstance(named, str) and named else "mesh (file object)"
-    data = source.read()
-    if isinstance(data, str):
-        data = data.encode()
+    name = one_line(named) if isinstance(named, str) and named else "mesh (file object)"
+    data = _read_to_end(source, name)
     if not isinstance(data, bytes | bytearray | memoryview):
         raise TypeError(f"source.read() must return bytes, got {type(data).__name__}")
     return name, None, bytes(data)
+
+
+def _read_to_end(source: Readable, name: str) -> object:
+    """What `source.read` returns, text as bytes; OSError or ValueError that names the file if it fails."""
+    try:
+        data = source.read()
+        return data.encode(errors="surrogateescape") if isinstance(data, str) else data
+    except MemoryError:
+        raise
+    except UnicodeError:
+        raise ValueError(f"{name}: is opened as text, but is binary: open it with mode 'rb'") from None
+    except OSError as error:
+        raise named_error(error, name) from error
+    except Exception as error:  # of decompressors, archives and closed files
+        reason = one_line(str(error)) or type(error).__name__
+        raise ValueError(f"{name}: can't be read: {reason:.120}") from error
 
 
 def _read(kind: str, data: bytes, name: str, folder: str | None, real: Real) -> Mesh:
@@ -96,8 +114,6 @@ def _read(kind: str, data: bytes, name: str, folder: str | None, real: Real) -> 
         reader = import_module(f"wive._internal.formats.{kind}")
         read: Callable[[bytes, str, np.dtype[Any]], Mesh] = reader.read
         return read(data, name, real.dtype)
-    from wive._internal.formats.unread import unread
-
     raise unread(name, kind)
 
 

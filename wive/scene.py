@@ -95,7 +95,11 @@ class Scene:
         file_type: str | None = None,
         **kwargs: Any,
     ) -> Scene:
-        """A scene from a mesh file, read by `wive.load_mesh`; other keywords are those of `Scene`."""
+        """A scene from a mesh file, read by `wive.load_mesh`; other keywords are those of `Scene`.
+
+        Accuracy "exact" is that for the vertices rounded to `dtype`; with np.float64 it refuses files that
+        hold finer numbers than float32.
+        """
         return cls(*load_mesh(source, dtype, file_type=file_type), **kwargs)
 
     @overload

@@ -248,3 +248,10 @@ def test_inputs_may_share_an_offset_and_ids_may_be_escaped():
     shared = SQUARE.replace('offset="1"', 'offset="0"').replace("0 0 1 0 2 0 0 0 2 0 3 0", "0 1 2\n0 2 3 ")
     assert heights(document(shared, DRAWN)) == [0]
     assert heights(document(SQUARE.replace('id="a"', 'id="a b"'), node(draw("a%20b")))) == [0]
+
+
+def test_encodings_that_are_not_read_are_named():
+    whole = document(geometry("g", POINTS, primitive("triangles", [0, 1, 2])), node(draw("g")))
+    for encoding, reason in (("shift_jis", "multi-byte encodings are not supported"), ("klingon", "unknown")):
+        message = refusal(whole.replace("utf-8", encoding), "dae")
+        assert message.startswith(f"line 1: {reason}") and message.endswith("save the file as UTF-8")

@@ -6,6 +6,7 @@ import zipfile
 
 import numpy as np
 import pytest
+from support.gltf_files import primitive, square
 from support.mesh_files import TRIANGLE, WHOLE, damaged, npz, ply_binary, ply_text, stl_binary
 
 import wive
@@ -54,6 +55,19 @@ def test_every_truncation_is_read_or_refused(kind):
     for whole in WHOLE[kind]:
         for size in range(0, len(whole), 1 if len(whole) < 400 else 3):
             load_or_refusal(whole[:size], kind)
+
+
+def many_nodes(count: int) -> bytes:
+    """A glTF model whose nodes all draw one mesh with as many targets, by a skin of as many joints."""
+    model, position, indices = square()
+    weights = model.array([[1, 0, 0, 0]] * 4, "f4")
+    mesh = primitive(position, indices, targets=[{}] * count)
+    mesh["attributes"] |= {"JOINTS_0": model.array([[0] * 4] * 4, "u1"), "WEIGHTS_0": weights}
+    number = model.mesh(mesh)
+    for _ in range(count):
+        model.node(mesh=number, skin=0, weights=[])
+    model.json["skins"] = [{"joints": list(range(count))}]
+    return model.glb()
 
 
 def npz_claiming(shape: tuple[int, ...]) -> bytes:
@@ -120,6 +134,8 @@ def test_claims_beyond_the_file_are_refused_before_memory_is_taken(kind, data):
         ("stl", b"solid " * 300_000),
         ("stl", b"solid\n" * 100_000),
         ("stl", (b"end" + b" " * 5000 + b"olid\n") * 100),
+        ("glb", many_nodes(8000)),
+        ("stl", b"solid a facet normal 0 0 1 endsolid a " * 50_000),
         ("off", b" " * 300_000 + b"OFF"),
         ("ply", ply_text().replace(b"comment x\n", b"comment\n" * 100_000)),
         (

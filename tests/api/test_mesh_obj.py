@@ -71,6 +71,7 @@ ORDINARY = {
     "empty lines": (V + "f 1 2 3\n").replace("\n", "\n\n \n"),
     "comments": "# a\n" + V.replace("\n", " # f 9 9 9\n") + "#f 7 8 9\nf 1 2 3 # floor\n",
     "comment without a blank": V + "f 1 2 3#floor\n",
+    "comment behind a point": V.replace("0 0 0\n", "0. 0. 0.# f 9 9 9\n") + "f 1 2 3\n",
     "comment that ends in a backslash": "# C:\\meshes\\\n" + V + "f 1 2 3\n",
     "name that ends in a backslash": V + "mtllib C:\\meshes\\\nf 1 2 3\nusemtl a\\ \\\n",
     "continued": V + "f 1 \\\n 2 \\ \n3\n",

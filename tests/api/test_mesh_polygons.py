@@ -31,7 +31,8 @@ def triangles_of(points: np.ndarray) -> np.ndarray:
 def assert_covers(polygon: np.ndarray, triangles: np.ndarray) -> None:
     """Triangles with area, none turned over, whose areas add up to the polygon's: they cover it once."""
     assert triangles.shape == (len(polygon) - 2, 3)
-    areas = np.array([area(polygon[triangle]) for triangle in triangles])
+    one, other = np.moveaxis(polygon[triangles[:, 1:]] - polygon[triangles[:, :1]], 1, 0)
+    areas = (one[:, 0] * other[:, 1] - one[:, 1] * other[:, 0]) / 2
     assert (areas > 0).all()
     assert areas.sum() == pytest.approx(area(polygon), rel=1e-9)
 
@@ -140,3 +141,14 @@ def test_an_outline_of_many_corners_is_cut_and_a_tangle_is_refused():
     assert_covers(outline, triangles_of(turned(outline, random)))
     with pytest.raises(ValueError, match=r"^file: a polygon of 600,001 corners is too tangled: triangulate"):
         triangles_of(random.normal(size=(600_001, 3)))
+
+
+@pytest.mark.parametrize("shape", ["stairs", "zigzag"])
+def test_an_outline_whose_ears_are_long_is_cut(shape):
+    steps = np.arange(14_000)
+    outline, closing = {
+        "stairs": (np.stack([(steps + 1) // 2, steps // 2], axis=1), [[0, 7000]]),
+        "zigzag": (np.stack([steps, steps % 2], axis=1), [[14_000, 5], [0, 5]]),
+    }[shape]
+    outline = np.concatenate([outline, closing]).astype(float)
+    assert_covers(outline, triangles_of(np.pad(outline, ((0, 0), (0, 1)))))

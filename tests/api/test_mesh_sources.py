@@ -1,9 +1,12 @@
 """Mesh files as paths, bytes and file objects, and how their format is told."""
 
+import bz2
 import gzip
 import io
+import lzma
 import pathlib
 import tempfile
+import zipfile
 
 import numpy as np
 import pytest
@@ -56,6 +59,85 @@ def test_file_objects_of_other_kinds(tmp_path):
     with gzip.open(tmp_path / "mesh.obj.gz") as file:
         assert len(wive.load_mesh(file, file_type="obj")[1]) == 6
     assert len(wive.load_mesh(io.StringIO(OBJ.decode()), file_type="obj")[1]) == 6
+
+
+@pytest.mark.parametrize(("kind", "module"), {"gz": gzip, "bz2": bz2, "xz": lzma}.items())
+def test_streams_that_unpack_need_no_file_type_and_packed_content_is_refused(kind, module, tmp_path):
+    path = tmp_path / f"mesh.obj.{kind}"
+    path.write_bytes(module.compress(OBJ))
+    with module.open(path) as file:
+        assert len(wive.load_mesh(file)[1]) == 6
+    for source in (path, path.read_bytes()):
+        for file_type in (None, "obj", "stl", "npz"):
+            with pytest.raises(ValueError, match="is compressed: unpack it, or pass a file object that does"):
+                wive.load_mesh(source, file_type=file_type)
+
+
+def streams_that_fail(folder) -> dict[str, io.IOBase]:
+    packed = gzip.compress(OBJ)
+    (folder / "cut.gz").write_bytes(packed[:-9])
+    (folder / "damaged.gz").write_bytes(packed[:15] + b"\xff\xff" + packed[17:])
+    (folder / "other.gz").write_bytes(b"hello")
+    (folder / "other.xz").write_bytes(b"hello" * 9)
+    (folder / "binary.stl").write_bytes(b"\xff" * 84)
+    with open(folder / "binary.stl", "rb") as closed:
+        pass
+    return {
+        "cut.gz": gzip.open(folder / "cut.gz"),
+        "damaged.gz": gzip.open(folder / "damaged.gz"),
+        "other.gz": gzip.open(folder / "other.gz"),
+        "other.xz": lzma.open(folder / "other.xz"),
+        "binary.stl": open(folder / "binary.stl", encoding="utf-8"),
+        "written": open(folder / "written", "wb"),
+        "closed": closed,
+        "broken": Broken(RuntimeError("a\nb")),
+        "failing disk": Broken(OSError(5, "Input/output error")),
+    }
+
+
+class Broken(io.BytesIO):
+    def __init__(self, error: Exception) -> None:
+        super().__init__()
+        self.error = error
+
+    def read(self, *_):
+        raise self.error
+
+
+def test_streams_that_fail_are_refused_in_one_line(tmp_path):
+    for name, stream in streams_that_fail(tmp_path).items():
+        with pytest.raises((ValueError, OSError)) as error:
+            wive.load_mesh(stream, file_type="obj")
+        stream.close()
+        assert str(error.value).isprintable(), name
+        named = getattr(stream, "name", None)
+        assert (named if isinstance(named, str) else "mesh (file object)") in str(error.value), name
+
+
+def test_text_streams_give_the_bytes_that_they_were_read_from(tmp_path):
+    path = tmp_path / "mesh.obj"
+    path.write_bytes(b"# st\xfchle\n" + OBJ)
+    for options in ({"encoding": "latin-1"}, {"encoding": "utf-8", "errors": "surrogateescape"}):
+        with open(path, **options) as file:
+            assert len(wive.load_mesh(file)[1]) == 6
+
+
+def test_names_with_line_breaks_stay_on_one_line(tmp_path):
+    path = tmp_path / "two\nlines.obj"
+    path.write_bytes(b"bad")
+    with pytest.raises(ValueError, match=r"two\\nlines.obj: line 1: expected a statement of OBJ") as error:
+        wive.load_mesh(path)
+    assert str(error.value).isprintable()
+    with open(path, "rb") as file, pytest.raises(ValueError, match=r"two\\nlines.obj: line 1"):
+        wive.load_mesh(file)
+
+
+def test_archives_of_other_files_are_called_so():
+    file = io.BytesIO()
+    with zipfile.ZipFile(file, "w") as archive:
+        archive.writestr("mesh.obj", OBJ)
+    with pytest.raises(ValueError, match="is an archive: unpack it"):
+        wive.load_mesh(file.getvalue())
 
 
 def test_errors_name_the_source(tmp_path):

@@ -25,6 +25,14 @@ ORDINARY = {
     "CR": STL_TEXT.replace(b"\n", b"\r"),
     "tabs": STL_TEXT.replace(b" ", b"\t"),
     "on fewer lines": STL_TEXT.replace(b"\n  ", b" "),
+    "on one line": STL_TEXT.replace(b"\n", b" "),
+    "a facet behind the name": STL_TEXT.replace(b"name\nf", b"facet normal f"),
+    "a facet of no normal behind the name": STL_TEXT.replace(
+        b"name\nfacet normal 0 0 1", b"b facet normal nan nan nan"
+    ),
+    "an end behind a facet": STL_TEXT.replace(b"endfacet\nend", b"endfacet end"),
+    "two solids on one line": (b"solid a\n" + FACET + b"endsolid a\nsolid b\n" + FACET).replace(b"\n", b" "),
+    "solid in names": STL_TEXT.replace(b"a name", b"solid my solid end solid"),
     "two solids": b"solid a\n" + FACET + b"endsolid a\nsolid b\n" + FACET + b"endsolid b\n",
     "two solids without ends": b"solid a\n" + FACET + b"solid\n" + FACET,
     "end solid": b"solid a\n" + FACET * 2 + b"end solid\n",

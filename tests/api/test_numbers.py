@@ -197,8 +197,14 @@ def test_float64_copies_of_float32_rays_give_the_same_hits_near_by():
     assert_same_hits(scene.intersect(*doubles), scene.intersect(origins, directions))
 
 
+class Unreadable:
+    def __array__(self, dtype=None, copy=None):
+        raise RuntimeError("two\nlines")
+
+
 @pytest.mark.parametrize(
-    "value", [None, "abc", [["a", "b", "c"]], [[1j, 0, 0]], [[True, False, True]], np.zeros((1, 3), "M8[s]"),
+    "value", [None, "abc", Unreadable(), [["a", "b", "c"]],
+              [[1j, 0, 0]], [[True, False, True]], np.zeros((1, 3), "M8[s]"),
               [[{}, 1, 2]], {"a": 1}, [[1, 2], [1, 2, 3]]]
 )  # fmt: skip
 def test_what_holds_no_numbers_is_refused_in_one_line(value):

@@ -336,3 +336,23 @@ def test_ctrl_c_ends_a_long_render_with_130_and_no_file(ball, tmp_path):
     assert errors.endswith("wive: interrupted\n")
     assert "Traceback" not in errors
     assert list(tmp_path.iterdir()) == [ball]
+
+
+@pytest.mark.parametrize("command", ["render", "trace", "info"])
+def test_help_shows_each_default_once_and_none_that_is_nothing(capsys, command):
+    with pytest.raises(SystemExit):
+        main([command, "--help"])
+    text = " ".join(capsys.readouterr().out.split())
+    assert "(default: auto)" in text
+    assert "None" not in text and "False" not in text
+    assert command != "render" or "of the random numbers (default: 0)" in text
+
+
+@pytest.mark.parametrize("options", [("--threads", "0"), ("--all", "--max-bytes", "0")])
+def test_bad_options_are_refused_before_the_progress_bar(ball, tmp_path, capsys, options):
+    np.save(tmp_path / "rays.npy", np.zeros((1, 6)))
+    assert (
+        main(["trace", str(ball), str(tmp_path / "rays.npy"), "-o", str(tmp_path / "o.npz"), *options]) == 2
+    )
+    error = capsys.readouterr().err
+    assert error.startswith("wive: error: ") and error.count("\n") == 1

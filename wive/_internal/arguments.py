@@ -211,6 +211,11 @@ def in_flight(value: int | None) -> int:
     return 0 if value is None else integer("in_flight", value, 1)
 
 
+def max_bytes(value: int | None) -> int:
+    """The bytes that all hits may take; 0 is by what memory there is."""
+    return 0 if value is None else integer("max_bytes", value, 1, MOST_BYTES)
+
+
 def work(
     backend: str,
     lacks: Iterable[str],
@@ -219,12 +224,11 @@ def work(
     asked_lanes: LanesOption,
     stats: bool,
     touching: bool = False,
-    max_bytes: int | None = None,
+    most_bytes: int | None = None,
 ) -> Work:
     """The options of a query, checked; ValueError for one that the backend lacks."""
     chosen = lanes(asked_lanes)
-    limit = 0 if max_bytes is None else integer("max_bytes", max_bytes, 1, MOST_BYTES)
-    flags = flag("stats", stats), chosen, flag("touching", touching), limit
+    flags = flag("stats", stats), chosen, flag("touching", touching), max_bytes(most_bytes)
     checked = _work((threads(asked_threads), in_flight(asked_in_flight), *flags))
     refuse_lacking(backend, lacks, {"threads": asked_threads, "in_flight": asked_in_flight, "lanes": chosen})
     return checked
@@ -327,8 +331,10 @@ def _numeric(
     """`value` as an array of these kinds of dtype; ValueError if some are masked and may not be `masked`."""
     try:
         array = np.asarray(value)
-    except (TypeError, ValueError) as error:
-        if isinstance(value, (list, tuple)):
+    except MemoryError:
+        raise
+    except Exception as error:  # of `__array__`, which raises anything
+        if isinstance(value, (list, tuple)) and isinstance(error, ValueError):
             raise ValueError(f"{name} must be {expected}, got rows of unequal length") from None
         raise unreadable(name, value, error) from None
     if array.dtype.kind not in kinds and array.shape != (0,):

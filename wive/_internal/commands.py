@@ -11,8 +11,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from wive._internal.arguments import max_bytes as checked_max_bytes
 from wive._internal.arguments import rays as checked_rays
 from wive._internal.arguments import refuse_lacking
+from wive._internal.arguments import threads as checked_threads
 from wive._internal.files import atomic_write, check_output
 from wive._internal.npz_writer import write_npz
 from wive._internal.npzfile import Npz, check_input, open_npy_or_npz
@@ -65,6 +67,8 @@ def trace_rays(options: Namespace) -> None:
     if not options.all and (options.touching or options.max_bytes is not None):
         option = "--touching" if options.touching else "max_bytes"
         raise ValueError(f"{option} is only for all hits: add --all, or leave it out")
+    checked_threads(options.threads)  # before there is a progress bar
+    checked_max_bytes(options.max_bytes)
     query: Callable[..., Hits | AllHits] = scene.intersect
     if options.all:
         query = partial(scene.intersect_all, touching=options.touching, max_bytes=options.max_bytes)

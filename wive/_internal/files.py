@@ -7,6 +7,8 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from typing import BinaryIO
 
+from wive._internal.lines import one_line
+
 PathLike = str | bytes | os.PathLike[str] | os.PathLike[bytes]
 
 # Not kept when a file is replaced: whoever may write a file's content may not give away its owner's rights.
@@ -83,7 +85,7 @@ def atomic_write(path: PathLike) -> Iterator[BinaryIO]:
         with suppress(OSError):
             os.unlink(part)
         if isinstance(error, OSError):
-            raise _named(error, name) from error
+            raise named_error(error, name) from error
         raise
 
 
@@ -94,7 +96,7 @@ def _status(name: str) -> os.stat_result | None:
     except FileNotFoundError:
         return None
     except OSError as error:
-        raise _named(error, name) from None
+        raise named_error(error, name) from None
 
 
 def _is_same(found: os.stat_result, path: PathLike) -> bool:
@@ -119,10 +121,10 @@ def _keep_owner_and_mode(file: int, replaced: os.stat_result) -> None:
     os.fchmod(file, mode)
 
 
-def _named(error: OSError, name: str) -> OSError:
+def named_error(error: OSError, name: str) -> OSError:
     """The error, of the same kind, with a text that names the file."""
     if error.errno is None:
-        return OSError(f"{name}: {error}")
+        return OSError(f"{name}: {one_line(str(error)):.120}")
     reason = error.strerror or os.strerror(error.errno)
     if error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG):
         reason += ", nothing was written"

@@ -44,7 +44,8 @@ def real(name: str, value: object) -> float:
     """`value` as a finite float."""
     try:
         # float() also takes arrays of one number, with a warning.
-        if isinstance(value, NOT_REAL) or np.ndim(value) > 0:  # type: ignore[arg-type]
+        is_masked = np.any(getattr(value, "mask", False))
+        if isinstance(value, NOT_REAL) or np.ndim(value) > 0 or is_masked:  # type: ignore[arg-type]
             raise TypeError
         number = float(value)  # type: ignore[arg-type]
     except OverflowError:

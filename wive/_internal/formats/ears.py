@@ -4,13 +4,20 @@ from __future__ import annotations
 
 from bisect import bisect_left, bisect_right
 from collections import deque
+from collections.abc import Iterator
+
+import numpy as np
 
 # Of a polygon, in corners looked at: some seconds. Outlines of 100,000 corners need a third.
 MOST_WORK = 30_000_000
 # What is done for each corner, and for each triangle that may be an ear, takes as long as looking at so many.
 WORK_PER_CORNER, WORK_PER_EAR = 50, 20
+# In strips of so many corners, groups that are outside of the triangle are left out: by calls of NumPy that
+# take as long as looking at so many.
+LONG, GROUP, WORK_PER_CALL = 512, 32, 300
 
 Triangles = list[tuple[int, int, int]]
+Place = tuple[float, float]
 
 
 class Tangled(Exception):
@@ -63,6 +70,10 @@ class _Ring:
         self._order = sorted(blocking, key=self._u.__getitem__)
         self._sorted_u = [self._u[i] for i in self._order]
         self._left = len(blocking)
+        begins = np.arange(0, len(blocking), GROUP)
+        sides = [np.array([side[i] for i in self._order]) for side in (self._u, self._v)]
+        bounds = [f.reduceat(side, begins) for side in sides for f in (np.minimum, np.maximum)]
+        self._groups = np.array(bounds if blocking else np.empty((4, 0)))
 
     def _turn(self, a: int, b: int, c: int) -> float:
         u, v = self._u, self._v
@@ -75,8 +86,9 @@ class _Ring:
         (au, av), (bu, bv), (cu, cv) = places = [(u[i], v[i]) for i in triangle]
         first = bisect_left(self._sorted_u, min(au, bu, cu))
         last = bisect_right(self._sorted_u, max(au, bu, cu))
-        self._spend(WORK_PER_EAR + last - first)
-        for i in self._order[first:last]:
+        is_long = last - first >= LONG
+        self._spend(WORK_PER_CALL if is_long else WORK_PER_EAR + last - first)
+        for i in self._grouped(first, last, places) if is_long else self._order[first:last]:
             if not self.blocks[i]:
                 continue
             pu, pv = u[i], v[i]
@@ -89,6 +101,19 @@ class _Ring:
             ):
                 return False
         return True
+
+    def _grouped(self, first: int, last: int, triangle: list[Place]) -> Iterator[int]:
+        """The corners of a long strip, but for groups whose bounds are outside of the triangle."""
+        first //= GROUP
+        low_u, high_u, low_v, high_v = self._groups[:, first : (last - 1) // GROUP + 1]
+        may_be_inside = np.ones(len(low_u), bool)
+        for (au, av), (bu, bv) in zip(triangle, (*triangle[1:], triangle[0]), strict=True):
+            u, v = low_u if bv > av else high_u, high_v if bu > au else low_v
+            may_be_inside &= (bu - au) * (v - av) >= (bv - av) * (u - au)
+        self._spend(len(low_u))
+        for begin in (GROUP * (first + np.flatnonzero(may_be_inside))).tolist():
+            self._spend(GROUP)
+            yield from self._order[begin : begin + GROUP]
 
     def _spend(self, work: int) -> None:
         self._work += work

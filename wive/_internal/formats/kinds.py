@@ -13,6 +13,13 @@ from wive._internal.formats.text import COMMENT, MARKS
 OBJ_LINE = re.compile(rb"^[ \t]*(?:v|f)[ \t]+[-+.\d]", re.MULTILINE)
 OFF_WORD = re.compile(rb"(?:ST)?C?N?4?n?OFF\b|OFF\d")
 SNIFFED = 1 << 16
+# Extensions of compressed files, and how such files begin.
+COMPRESSED = {
+    "gz": b"\x1f\x8b\x08",
+    "bz2": b"BZh",
+    "xz": b"\xfd7zXZ\0",
+    "zst": b"\x28\xb5\x2f\xfd",
+}
 
 
 def kind_of(data: bytes, name: str, file_type: str | None) -> str:
@@ -21,11 +28,19 @@ def kind_of(data: bytes, name: str, file_type: str | None) -> str:
         if not isinstance(file_type, str) or not file_type.strip(". "):
             raise ValueError(f"file_type must be a format such as 'ply', got {file_type!r:.60}")
         return file_type.strip().lower().rpartition(".")[2]
-    kind = os.path.splitext(name)[1].lower().lstrip(".")
-    kind = kind or _by_content(data)
+    stem, suffix = os.path.splitext(name)
+    kind = suffix.lower().lstrip(".")
+    if kind in COMPRESSED and not compression_of(data):  # of a stream that unpacks, as gzip.open makes
+        kind = os.path.splitext(stem)[1].lower().lstrip(".")
+    kind = kind or compression_of(data) or _by_content(data)
     if not kind and data:
         raise ValueError(f"{name}: nothing tells its format: pass file_type, such as 'ply'")
     return kind
+
+
+def compression_of(data: bytes) -> str:
+    """The extension of a compressed file that begins so, "" if it is none."""
+    return next((kind for kind, head in COMPRESSED.items() if data.startswith(head)), "")
 
 
 def _by_content(data: bytes) -> str:
@@ -58,7 +73,9 @@ def _by_members(data: bytes) -> str:
             names = archive.namelist()
     except (zipfile.BadZipFile, OSError, ValueError, NotImplementedError):
         return "npz"
-    return "3mf" if any(name.lower().endswith(".model") for name in names) else "npz"
+    if any(name.lower().endswith(".model") for name in names):
+        return "3mf"
+    return "npz" if not names or any(name.endswith(".npy") for name in names) else "zip"
 
 
 def is_binary_stl(data: bytes) -> bool:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from wive._internal.formats import Mesh
-from wive._internal.formats.text import COMMENT, Text, plain
+from wive._internal.formats.text import COMMENT, Text, plain, quoted
 from wive._internal.formats.triangulate import triangulate
 
 # ModelNet's files have no space behind OFF.
@@ -23,7 +23,8 @@ def read(data: bytes, name: str, dtype: np.dtype[Any]) -> Mesh:
     data = COMMENT.sub(b"", plain(data, name))
     header = HEADER.match(data)
     if not header:
-        raise Text(data, name).error(0, "expected a header such as OFF, COFF or NOFF")
+        found = quoted(data[:1000].lstrip().partition(b"\n")[0])
+        raise Text(data, name).error(0, f"expected a header such as OFF, COFF or NOFF, got {found}")
     if header[2] or header[3]:
         raise ValueError(
             f"{name}: line 1: {header[1].decode()} has vertices of other than three coordinates: "
@@ -31,8 +32,10 @@ def read(data: bytes, name: str, dtype: np.dtype[Any]) -> Mesh:
         )
     text = Text(data[header.end() :], name, data.count(b"\n", 0, header.end()))
     if not text.heads.size or text.counts[0] not in (2, 3):
-        raise text.error(0, "expected the number of vertices, of faces and, maybe, of edges")
-    vertex_count, face_count = text.integers(np.arange(2)).tolist()
+        found = text.quoted(0) if text.heads.size else "the file's end"
+        expected = "expected the number of vertices, of faces and, maybe, of edges"
+        raise text.error(0, f"{expected}, got {found}")
+    vertex_count, face_count, *_ = text.integers(np.arange(text.counts[0])).tolist()
     if vertex_count < 0 or face_count < 0 or vertex_count + face_count != len(text.heads) - 1:
         raise text.error(
             0,

@@ -20,7 +20,11 @@ VERTEX = ("vertex", None, None, None)
 FACET_WORDS = ("facet", "normal", None, None, None, "outer", "loop", *VERTEX * 3, "endloop", "endfacet")
 CORNER_WORDS = np.array([[8, 9, 10], [12, 13, 14], [16, 17, 18]])
 UTF_16 = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
-SOLID_LINE = re.compile(rb"\s*(?:end\s*)?solid(?!\S)")
+# The word that begins and ends solids, what may stand before it, and a facet that follows on its line.
+SOLID = re.compile(rb"solid(?!\S)")
+MOST_BEFORE = 16  # bytes of `end` and white space
+BEFORE_SOLID = re.compile(rb"(?<!\S)(?:end\s*)?\Z")
+FACET_START = re.compile(rb"(?<!\S)facet\s+normal\s+[-+.\dni]\S*\s+[-+.\dni]")
 
 
 def read(data: bytes, name: str, dtype: np.dtype[Any]) -> Mesh:
@@ -57,7 +61,7 @@ def _binary(data: bytes, name: str) -> NDArray[np.float32]:
 def _text(data: bytes, name: str, dtype: np.dtype[Any]) -> NDArray[Any]:
     data = plain(data, name).lower()
     text = Text(_without_names(data), name)
-    if not SOLID_LINE.match(data):
+    if not re.match(rb"\s*solid(?!\S)", data):
         raise text.error(0, f"expected `solid`, got {quoted(data[:20])}")
     count, rest = divmod(len(text.starts), len(FACET_WORDS))
     words: Ints = np.arange(count * len(FACET_WORDS)).reshape(count, len(FACET_WORDS))
@@ -70,16 +74,20 @@ def _text(data: bytes, name: str, dtype: np.dtype[Any]) -> NDArray[Any]:
 
 
 def _without_names(data: bytes) -> bytes:
-    """Empty the lines that begin and end solids, whose names may hold any words."""
-    kept, done = [], 0
-    at = data.find(b"solid")
-    while at >= 0:
-        begin, end = data.rfind(b"\n", 0, at) + 1, data.find(b"\n", at)
-        end = len(data) if end < 0 else end
-        if SOLID_LINE.match(data, begin, end):
-            kept.append(data[done:begin])
-            done = end
-        at = data.find(b"solid", end)
+    """Take out what begins and ends solids, to the line's end or its first facet: names are any words."""
+    kept, done, line_end = [], 0, 0
+    while found := SOLID.search(data, done):
+        begin = BEFORE_SOLID.search(data, max(done, found.start() - MOST_BEFORE), found.start())
+        if begin:
+            if line_end <= found.end():
+                line_end = data.find(b"\n", found.end())
+                line_end = len(data) if line_end < 0 else line_end
+            facet = FACET_START.search(data, found.end(), line_end)
+            kept.append(data[done : begin.start()])
+            done = facet.start() if facet else line_end
+        else:
+            kept.append(data[done : found.end()])
+            done = found.end()
     return b"".join([*kept, data[done:]])
 
 

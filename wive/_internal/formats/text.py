@@ -25,7 +25,7 @@ MARKS = (
 NUMBER = re.compile(rb"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?|[-+]?(?:nan|inf|infinity)", re.IGNORECASE)
 INTEGER = re.compile(rb"[-+]?\d+")
 # But 1.#INF and 1.#QNAN are how some programs print what is no number.
-COMMENT = re.compile(rb"(?<!\.)#[^\n]*")
+COMMENT = re.compile(rb"(?:(?<!\d\.)#|#(?!INF|IND|[QS]NAN))[^\n]*")
 # Words converted at once: their bytes stay in the cache.
 BATCH = 1 << 17
 

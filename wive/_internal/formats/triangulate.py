@@ -32,12 +32,13 @@ def triangulate(vertices: NDArray[Any], sizes: Ints, corners: Ints, name: str) -
     first = np.cumsum(sizes) - sizes
     triangle = np.cumsum(sizes - 2) - (sizes - 2)
     out = np.empty((int((sizes - 2).sum()), 3), np.int64)
-    for size in np.unique(sizes).tolist():
+    order = np.argsort(sizes, kind="stable")
+    for same in np.split(order, np.flatnonzero(np.diff(sizes[order])) + 1):
+        size = int(sizes[same[0]])
         some = max(1, BATCH // size)
-        same = np.flatnonzero(sizes == size)
         for which in (same[at : at + some] for at in range(0, len(same), some)):
             polygons = corners[first[which, None] + np.arange(size)]
-            found = polygons[:, _fan(size)]
+            found = polygons[:, fan(np.arange(size))]
             if size > 3:
                 try:
                     _mend(vertices, polygons, found)
@@ -54,10 +55,9 @@ def strip(corners: NDArray[Integer]) -> NDArray[Integer]:
     return found
 
 
-def _fan(size: int, begin: int = 0) -> Ints:
-    """The corners (size - 2, 3) of a fan from the corner `begin`."""
-    second = np.arange(1, size - 1)
-    return (np.stack([np.zeros_like(second), second, second + 1], axis=1) + begin) % size
+def fan(corners: NDArray[Integer]) -> NDArray[Integer]:
+    """Triangles (n - 2, 3) of a fan of n corners, each from the first one."""
+    return np.stack([np.broadcast_to(corners[:1], len(corners) - 2), corners[1:-1], corners[2:]], axis=1)
 
 
 def _mend(vertices: NDArray[Any], polygons: Ints, found: Ints) -> None:
@@ -72,7 +72,7 @@ def _mend(vertices: NDArray[Any], polygons: Ints, found: Ints) -> None:
         # A quad has no third way: it takes the better one.
         least = areas[rest].min(axis=1) if size == 4 else 0
         is_fan = _fan_areas(np.roll(flat[:, rest], -1, axis=2)).min(axis=1) > least
-        found[rest[is_fan]] = polygons[rest[is_fan]][:, _fan(size, 1)]
+        found[rest[is_fan]] = polygons[rest[is_fan]][:, fan(np.roll(np.arange(size), -1))]
         for row in rest[~is_fan].tolist() if size > 4 else ():
             found[row] = polygons[row][ears(*flat[:, row].tolist())]
 

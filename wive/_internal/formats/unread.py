@@ -9,11 +9,13 @@ SURFACES = (
     "holds surfaces and no triangles: tessellate it, as cascadio (PyPI) does: load_mesh(cascadio.load(data))"
 )
 ARCHIVE = "is an archive: unpack it and load the mesh file that it holds"
+COMPRESSED = "is compressed: unpack it, or pass a file object that does, such as gzip.open(path)"
 DRAWING = "holds a drawing and no triangles"
 REASONS = {
     **dict.fromkeys(("xyz", "xyzn", "xyzrgb", "pts", "pcd", "las", "laz", "e57"), POINTS),
     **dict.fromkeys(("step", "stp", "iges", "igs"), SURFACES),
-    **dict.fromkeys(("zip", "tar", "tar.gz", "tgz", "gz", "bz2", "xz", "7z", "rar"), ARCHIVE),
+    **dict.fromkeys(("zip", "tar", "tar.gz", "tgz", "7z", "rar"), ARCHIVE),
+    **dict.fromkeys(("gz", "bz2", "xz", "zst"), COMPRESSED),
     **dict.fromkeys(("dxf", "svg"), DRAWING),
     "binvox": f"holds voxels and no triangles: make a mesh of them first, then {CONVERT}",
 }

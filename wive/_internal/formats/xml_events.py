@@ -10,6 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 Attributes = dict[str, str]
+# Expat's error for encodings such as Shift JIS.
+MULTI_BYTE = "multi-byte encodings are not supported"
 # What Python's float takes beside numbers: 1_0 and digits of other scripts.
 STRANGE = re.compile(r"[_\x80-\U0010ffff]")
 
@@ -58,7 +60,11 @@ def parse(chunks: Iterable[bytes], handler: Handler) -> None:
         raise ValueError(
             f"line {error.lineno}: expected XML ({reason}): the file is cut off or damaged"
         ) from None
-    except LookupError as error:
+    except (LookupError, UnicodeError) as error:
+        raise ValueError(f"line 1: {error}: save the file as UTF-8") from None
+    except ValueError as error:
+        if str(error) != MULTI_BYTE:
+            raise
         raise ValueError(f"line 1: {error}: save the file as UTF-8") from None
     finally:  # a circle of references would keep what the handler holds
         del handler.line

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wive._internal.formats.dae.tree import Document, Element
-from wive._internal.formats.triangulate import strip, triangulate
+from wive._internal.formats.triangulate import fan, strip, triangulate
 
 PRIMITIVES = ("triangles", "polylist", "polygons", "tristrips", "trifans")
 
@@ -125,8 +125,5 @@ def taken_apart(
         return triangulate(vertices, np.array(runs, np.int64), listed, name)
     pieces = [np.empty((0, 3), np.int64)]
     for run in np.split(listed, np.cumsum(runs)[:-1]):
-        if primitive.tag == "tristrips":
-            pieces.append(strip(run))
-        else:
-            pieces.append(np.stack([np.broadcast_to(run[:1], len(run) - 2), run[1:-1], run[2:]], axis=1))
+        pieces.append(strip(run) if primitive.tag == "tristrips" else fan(run))
     return np.concatenate(pieces)

@@ -23,9 +23,9 @@ def morphed(
     document: Document, positions: NDArray[Any], primitive: Fields, weights: Doubles, place: str
 ) -> NDArray[Any]:
     """Positions moved by the primitive's targets, each times its weight."""
-    targets = objects(primitive, "targets", place)
     if not weights.any():
         return positions
+    targets = objects(primitive, "targets", place)
     if len(weights) != len(targets):
         raise ValueError(f"{place}: targets: expected one per weight, {len(weights)}, found {len(targets)}")
     result: NDArray[Any] = positions.astype(np.float64)

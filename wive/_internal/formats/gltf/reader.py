@@ -21,8 +21,8 @@ from wive._internal.formats.gltf.fields import Fields, index_of, members, object
 from wive._internal.formats.gltf.nodes import Drawn, Scene
 from wive._internal.formats.gltf.pose import default_weights, joint_matrices, morphed, skinned
 from wive._internal.formats.named import named
-from wive._internal.formats.placing import IDENTITY, Part, check_counts, joined
-from wive._internal.formats.triangulate import strip
+from wive._internal.formats.placing import IDENTITY, Matrix, Part, check_counts, joined
+from wive._internal.formats.triangulate import fan, strip
 
 LISTS, FAN = 4, 6  # modes; 5 is a strip
 Shape = tuple[NDArray[Any], NDArray[np.int32]]  # positions and corners of a primitive, in its mesh
@@ -71,6 +71,7 @@ class Meshes:
         self._primitives: dict[int, list[Primitive]] = {}
         self._shapes: dict[int, list[Shape]] = {}  # at rest, one per primitive
         self._rigid: dict[int, Shape] = {}  # whole meshes that no node poses
+        self._joints: dict[int, tuple[Matrix, bool]] = {}  # of skins: matrices, and whether all mirror
 
     def size(self, drawn: Drawn) -> tuple[int, int]:
         """Vertices and triangles of the mesh that a node draws."""
@@ -95,7 +96,7 @@ class Meshes:
         if drawn.mesh not in self._shapes:
             self._shapes[drawn.mesh] = [(points(document, one), triangles(document, one)) for one in mesh]
         skin = index_of(drawn.node, "skin", drawn.place)
-        joints = None if skin is None else joint_matrices(document, self._scene, skin, drawn.place)
+        joints, mirrored = (None, False) if skin is None else self._skin(skin, drawn.place)
         weights = default_weights(document.item("meshes", drawn.mesh, drawn.place), drawn.node, drawn.place)
         vertices: list[NDArray[Any]] = [np.empty((0, 3), np.float32)]
         corners = [np.empty((0, 3), np.int32)]
@@ -107,9 +108,14 @@ class Meshes:
             )
             corners.append(listed + np.int32(start))
             start += len(rest)
-        mirrored = joints is not None and (np.linalg.det(joints[:, :3, :3]) < 0).all()
         order = [0, 2, 1] if mirrored else [0, 1, 2]
         return np.concatenate(vertices), np.concatenate(corners)[:, order]
+
+    def _skin(self, skin: int, place: str) -> tuple[Matrix, bool]:
+        if skin not in self._joints:
+            matrices = joint_matrices(self._document, self._scene, skin, place)
+            self._joints[skin] = matrices, bool((np.linalg.det(matrices[:, :3, :3]) < 0).all())
+        return self._joints[skin]
 
 
 def primitives(document: Document, mesh: int, place: str) -> Iterator[Primitive]:
@@ -172,5 +178,5 @@ def triangles(document: Document, primitive: Primitive) -> NDArray[np.int32]:
     if primitive.mode == LISTS:
         return order.reshape(-1, 3)
     if primitive.mode == FAN:
-        return np.stack([order[1:-1], order[2:], np.broadcast_to(order[:1], len(order) - 2)], axis=1)
+        return fan(order)[:, [1, 2, 0]]
     return strip(order)
