@@ -92,6 +92,8 @@ def test_a_picture_does_not_replace_its_mesh(folder, capsys):
         ("chair.gltf", GLTF % "textures/wood.png", ""),
         ("chair.obj", "mtllib chair.mtl\n", "newmtl wood\nmap_Kd textures/wood.png\n"),
         ("chair.obj", "mtllib chair.mtl\n", "newmtl wood\r\nmap_Kd -s 1 1 1 textures\\WOOD.PNG\r\n"),
+        ("chair.gltf", GLTF % "textures%2F%77ood%2Epng", ""),
+        ("chair.gltf", GLTF % "textures/w\\u006fod.png", ""),
         ("chair.ply", "ply\nformat ascii 1.0\ncomment TextureFile wood.png\n", ""),
     ],
 )
@@ -117,3 +119,25 @@ def test_an_old_output_is_replaced(folder, capsys):
     assert (folder / "room.png").read_bytes()[:4] == b"\x89PNG"
     with np.load("hits.npz") as hits:
         assert hits["prim"].shape == (1,)
+
+
+def test_a_picture_does_not_replace_a_texture_by_a_link_or_one_that_materials_elsewhere_name(folder, capsys):
+    pytest.importorskip("PIL")
+    (folder / "chair.obj").write_text("mtllib sub/größe 1.mtl\n")
+    (folder / "sub" / "größe 1.mtl").write_text("map_Kd a wood.png\n")
+    (folder / "a wood.png").write_bytes(b"texture")
+    (folder / "link.png").symlink_to("a wood.png")
+    (folder / "room.gltf").write_text(GLTF % "a%20wood.png")
+    before = content(folder)
+    for mesh in ("chair.obj", "room.gltf"):
+        for output in ("a wood.png", "link.png"):
+            assert "names it" in refused(capsys, "render", mesh, "-o", output)
+    assert content(folder) == before
+
+
+def test_hits_do_not_replace_a_buffer_of_the_mesh(folder, capsys):
+    (folder / "mesh.gltf").write_text('{"asset":{"version":"2.0"},"buffers":[{"uri":"buffer.npz"}]}')
+    (folder / "buffer.npz").write_bytes(b"buffer")
+    before = content(folder)
+    assert "names it" in refused(capsys, "trace", "mesh.gltf", "rays.npz", "-o", "buffer.npz")
+    assert content(folder) == before

@@ -1,6 +1,5 @@
 """The commands of the command line, given their parsed options."""
 
-import os
 import time
 from argparse import Namespace
 from collections.abc import Callable
@@ -22,7 +21,7 @@ from wive._internal.picture import Settings
 from wive._internal.precision import FLOAT64, Floats, Real, real_named
 from wive._internal.progress import progress_bar
 from wive._internal.terrain import terrain_camera, terrain_mesh
-from wive._internal.textures import names_file
+from wive._internal.textures import refuse_part
 from wive.all_hits import AllHits
 from wive.backend import Backend, backends
 from wive.camera import Camera
@@ -38,11 +37,8 @@ BATCH_RAYS = 500_000
 def render_picture(options: Namespace) -> None:
     """`wive render`: path-trace a mesh, or the terrain, into a PNG."""
     output = check_png_output(options.output, [options.mesh])
-    if options.mesh and os.path.exists(output) and names_file(check_input(options.mesh), output):
-        raise ValueError(
-            f"output file {output!r} exists and the mesh {options.mesh!r} names it, "
-            "as its texture or another part: choose another name"
-        )
+    if options.mesh:
+        refuse_part(check_input(options.mesh), output)
     options.albedo = options.albedo or ("gray" if options.mesh else "normals")
     settings = Settings(**{field.name: getattr(options, field.name) for field in fields(Settings)})
     scene = _scene(options, *(load_mesh(options.mesh) if options.mesh else terrain_mesh()))
@@ -58,6 +54,7 @@ def trace_rays(options: Namespace) -> None:
     """`wive trace`: write the closest hits, or all, of a file of rays to an npz file."""
     output = check_output(options.output, ".npz", [options.mesh, options.rays])
     check_input(options.rays)
+    refuse_part(check_input(options.mesh), output)
     scene = _scene(options, *load_mesh(options.mesh, options.precision))
     refuse_lacking(scene.backend, scene._tracer.lacks, {"threads": options.threads})
     origins, directions, tmin, tmax = _read_rays(
