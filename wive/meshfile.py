@@ -25,6 +25,7 @@ TEXT = ("obj", "off", "ply", "stl")
 OTHERS = {"npz": "npz", "3mf": "threemf.reader", "dae": "dae.reader"}
 # Vertices and triangles are numbered by int32.
 MOST = 2**31 - 1
+LONGEST_NAME = 4096
 
 
 class Readable(Protocol):
@@ -72,6 +73,10 @@ def _content(source: MeshSource) -> tuple[str, str | None, bytes]:
         path = check_input(source)
         with open(path, "rb") as file:
             return one_line(path), os.path.dirname(os.path.abspath(path)), file.read()
+    if isinstance(source, bytes) and len(source) < LONGEST_NAME and os.path.isfile(source):
+        raise ValueError(
+            f"mesh (bytes): is the name of a file, not its content: pass {os.fsdecode(source)!r}"
+        )
     if isinstance(source, bytes | bytearray | memoryview):
         return "mesh (bytes)", None, bytes(source)
     if not callable(getattr(source, "read", None)):
@@ -124,7 +129,7 @@ def _checked(mesh: Mesh, name: str, real: Real) -> tuple[Floats, NDArray[np.int3
         if array.dtype.kind not in kinds:
             numbers = "real numbers" if what == "vertices" else "integers"
             raise ValueError(f"{name}: {what} must be {numbers}, got dtype {array.dtype}")
-        if array.size and (array.ndim != 2 or array.shape[1] != 3):
+        if array.shape[:1] != (0,) and array.shape[1:] != (3,):
             raise ValueError(f"{name}: {what} must have three columns, got shape {array.shape}")
         if len(array) > MOST:
             raise ValueError(f"{name}: has {len(array):,} {what}, more than {MOST:,}: split the file")

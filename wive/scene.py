@@ -14,6 +14,7 @@ from wive._internal.arguments import USUAL_WORK, LanesOption, Work
 from wive._internal.cpu_tracer import CpuTracer
 from wive._internal.files import PathLike, file_name
 from wive._internal.host_arrays import host_array
+from wive._internal.lines import one_line
 from wive._internal.precision import FLOAT64, Floats, Precision, real_of
 from wive._internal.rays import Rays, check_rays
 from wive._internal.storage import FORMAT_VERSION, Options, read_scene, refuse_newer, write_scene
@@ -423,7 +424,7 @@ def load(path: PathLike, *, backend: str | None = None, device: str | None = Non
     try:
         return Scene(vertices, faces, **options)
     except (TypeError, ValueError) as error:
-        raise ValueError(f"{file_name(path)}: {error}") from error
+        raise ValueError(f"{one_line(file_name(path))}: {error}") from error
 
 
 def _rebuild(vertices: Floats, faces: NDArray[np.int32], options: Options, version: int = 1) -> Scene:

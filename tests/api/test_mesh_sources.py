@@ -201,6 +201,7 @@ def test_npz_arrays_may_have_any_order_and_integer_dtype():
         (np.eye(3), [["a", "b", "c"]], "faces must be integers, got dtype <U1"),
         (np.eye(3) * 1j, [[0, 1, 2]], "vertices must be real numbers, got dtype complex128"),
         (np.eye(3)[:, :2], [[0, 1, 2]], "vertices must have three columns, got shape (3, 2)"),
+        (np.empty((3, 0)), [[0, 1, 2]], "vertices must have three columns, got shape (3, 0)"),
         (np.eye(3), [0, 1, 2], "faces must have three columns, got shape (3,)"),
         (np.full((3, 3), np.inf), [[0, 1, 2]], "vertex 0 of triangle 0 must be finite float32 numbers"),
     ],

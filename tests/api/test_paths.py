@@ -54,7 +54,11 @@ def test_meshes_are_loaded(tmp_path, form):
     path = tmp_path / "mesh.npz"
     np.savez(path, vertices=TRIANGLE[0], faces=TRIANGLE[1])
     if isinstance(form(path), bytes):
-        pytest.skip("bytes are a mesh file's content")
+        with pytest.raises(
+            ValueError, match=r"^mesh \(bytes\): is the name of a file, not its content: pass '/"
+        ):
+            wive.load_mesh(form(path))
+        return
     assert len(wive.load_mesh(form(path))[1]) == len(wive.Scene.from_file(form(path))) == 1
 
 
@@ -83,3 +87,14 @@ def test_errors_name_the_file_as_text(tmp_path):
         wive.load(os.fsencode(tmp_path / "missing"))
     assert str(error.value) == f"{tmp_path / 'missing'}: no such file"
     assert len(pickle.loads(pickle.dumps(wive.load(os.fsencode(tmp_path / "scene"))))) == 1
+
+
+def test_names_with_line_breaks_stay_on_one_line(tmp_path):
+    path = tmp_path / "two\nlines"
+    for content in (None, b"", b"PK", b"hello"):
+        if content is not None:
+            path.write_bytes(content)
+        for call in (wive.load, wive.load_mesh):
+            with pytest.raises((ValueError, OSError)) as error:
+                call(path)
+            assert str(error.value).isprintable() and "two\\nlines" in str(error.value)

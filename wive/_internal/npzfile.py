@@ -31,8 +31,8 @@ class Npz(Mapping[str, NDArray[Any]]):
 
     def __init__(self, file: IO[bytes], name: str, expected: str) -> None:
         """Read the table of contents; `expected` says in errors what the file should have been."""
-        self._name, self._expected = name, expected
-        with _refused(name, expected, "its table of contents"):
+        self._name, self._expected = one_line(name), expected
+        with _refused(self._name, expected, "its table of contents"):
             self._archive = Archive(file)
         self._members = {member.removesuffix(".npy"): member for member in self._archive.names}
 
@@ -80,7 +80,7 @@ def open_npy_or_npz(path: PathLike, expected: str) -> Iterator[NDArray[Any] | Np
         if magic != npy.MAGIC_PREFIX:
             yield Npz(file, name, expected)
             return
-        with _refused(name, expected, "its array"):
+        with _refused(one_line(name), expected, "its array"):
             array = _array(file, size)
         yield array
 
@@ -89,11 +89,11 @@ def check_input(path: PathLike) -> str:
     """Raise OSError unless `path` is a file that can be read; return it as text."""
     name = file_name(path)
     if not os.path.exists(name):
-        raise FileNotFoundError(f"{name}: no such file")
+        raise FileNotFoundError(f"{one_line(name)}: no such file")
     if not os.path.isfile(name):
-        raise OSError(f"{name}: not a file")
+        raise OSError(f"{one_line(name)}: not a file")
     if not os.access(name, os.R_OK):
-        raise PermissionError(f"{name}: not readable")
+        raise PermissionError(f"{one_line(name)}: not readable")
     return name
 
 

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wive._internal.files import PathLike, atomic_write, file_name
+from wive._internal.lines import one_line
 from wive._internal.npzfile import Npz, open_npz
 from wive._internal.precision import Floats
 
@@ -52,9 +53,9 @@ def read_scene(path: PathLike) -> tuple[Floats, NDArray[np.int32], Options]:
 
     Raises OSError if the file can't be read, ValueError if it is no scene or of a newer version.
     """
-    name = file_name(path)
+    name = one_line(file_name(path))
     no_scene = f"{name}: not a scene saved by wive"
-    with open_npz(name, "a scene saved by wive") as found:
+    with open_npz(path, "a scene saved by wive") as found:
         header = _header(found[HEADER]) if HEADER in found else None
         if header is None:
             raise ValueError(no_scene)
