@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from wive._internal.formats import ears
 from wive._internal.formats.triangulate import triangulate
 
 
@@ -152,3 +153,17 @@ def test_an_outline_whose_ears_are_long_is_cut(shape):
     }[shape]
     outline = np.concatenate([outline, closing]).astype(float)
     assert_covers(outline, triangles_of(np.pad(outline, ((0, 0), (0, 1)))))
+
+
+def test_corners_in_groups_are_the_same_as_one_by_one(monkeypatch):
+    """Also of polygons that cross themselves, with corners at equal places and in lines."""
+    random = np.random.default_rng(13)
+    for number in range(300):
+        count = int(random.integers(5, 80))
+        points = star(count, random) if number % 2 else random.integers(0, 6, (count, 2)).astype(float)
+        found = []
+        for long, group in ((count + 1, 1), (1, int(random.integers(1, 9)))):
+            monkeypatch.setattr(ears, "LONG", long)
+            monkeypatch.setattr(ears, "GROUP", group)
+            found.append(ears.ears(*points.T.tolist()))
+        assert found[0] == found[1]

@@ -104,16 +104,16 @@ class _Ring:
 
     def _grouped(self, first: int, last: int, triangle: list[Place]) -> Iterator[int]:
         """The corners of a long strip, but for groups whose bounds are outside of the triangle."""
-        first //= GROUP
-        low_u, high_u, low_v, high_v = self._groups[:, first : (last - 1) // GROUP + 1]
+        group = first // GROUP
+        low_u, high_u, low_v, high_v = self._groups[:, group : (last - 1) // GROUP + 1]
         may_be_inside = np.ones(len(low_u), bool)
         for (au, av), (bu, bv) in zip(triangle, (*triangle[1:], triangle[0]), strict=True):
             u, v = low_u if bv > av else high_u, high_v if bu > au else low_v
             may_be_inside &= (bu - au) * (v - av) >= (bv - av) * (u - au)
         self._spend(len(low_u))
-        for begin in (GROUP * (first + np.flatnonzero(may_be_inside))).tolist():
+        for begin in (GROUP * (group + np.flatnonzero(may_be_inside))).tolist():
             self._spend(GROUP)
-            yield from self._order[begin : begin + GROUP]
+            yield from self._order[max(first, begin) : min(last, begin + GROUP)]
 
     def _spend(self, work: int) -> None:
         self._work += work
