@@ -236,3 +236,14 @@ def test_meshes_of_many_rows_are_read_whole():
     faces = random.integers(12_000, size=(12_000, 3))
     vertices, read = wive.load_mesh(package(model({"1": mesh(points, faces)}, ['objectid="1"'])), np.float64)
     assert (vertices == points).all() and (read == faces).all()
+
+
+def test_copies_of_copies_without_number_are_refused_before_they_are_made():
+    objects = {"0": mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]), "empty": components()}
+    for level in range(25):
+        objects[str(level + 1)] = components(*[f'objectid="{level}"'] * 2)
+    assert "scene: places its copies in" in refused(package(model(objects, ['objectid="25"'])))
+    objects = {"0": objects["0"], "empty": components()}
+    objects["1"] = components('objectid="0"', *['objectid="empty"'] * 5000)
+    objects["2"] = components(*['objectid="1"'] * 5000)
+    assert "scene: places its copies in" in refused(package(model(objects, ['objectid="2"'])))

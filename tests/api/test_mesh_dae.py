@@ -255,3 +255,11 @@ def test_encodings_that_are_not_read_are_named():
     for encoding, reason in (("shift_jis", "multi-byte encodings are not supported"), ("klingon", "unknown")):
         message = refusal(whole.replace("utf-8", encoding), "dae")
         assert message.startswith(f"line 1: {reason}") and message.endswith("save the file as UTF-8")
+
+
+def test_copies_of_copies_without_number_are_refused_before_they_are_made():
+    library = node(draw("a"), key="n0")
+    for level in range(25):
+        library += node(*[f'<instance_node url="#n{level}"/>'] * 2, key=f"n{level + 1}")
+    text = document(SQUARE, node('<instance_node url="#n25"/>'), library)
+    assert "scene: places its copies in" in refused(text)

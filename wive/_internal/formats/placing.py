@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import groupby
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,13 +18,40 @@ IDENTITY = np.eye(4)
 Part = tuple[NDArray[Any], NDArray[np.int32], Matrix]
 BATCH = 1 << 16  # vertices placed at once: their coordinates stay in the cache
 MOST = 2**31 - 1  # vertices and triangles are numbered by int32
+# Nodes that hold copies of nodes make any number of them from a small file: so many take half a minute.
+MOST_STEPS = 1 << 23
 
 
-def check_counts(vertices: int, triangles: int) -> None:
-    """Raise ValueError if int32 can't number all copies, MemoryError if memory can't hold them."""
-    if max(vertices, triangles) > MOST:
-        raise ValueError(f"scene: has {vertices} vertices and {triangles} triangles, expected at most {MOST}")
-    expect_room(3 * (vertices + triangles), np.float64)  # placed in double; then joined, in half of that
+class Counts(NamedTuple):
+    """Vertices and triangles of all copies in a part of a scene, and the steps that place them."""
+
+    vertices: int
+    triangles: int
+    steps: int
+
+    @classmethod
+    def of(cls, vertices: int, triangles: int, below: Sequence[Counts] = ()) -> Counts:
+        """Those of a node with so many of its own and all that it holds; steps lead to no empty node."""
+        total = cls(*map(sum, zip((vertices, triangles, 0), *below, strict=True)))
+        steps = total.steps + 1 + len(below)
+        return total._replace(steps=steps) if total.vertices or total.triangles else NOTHING
+
+    def check(self) -> None:
+        """Raise ValueError if there are too many copies, MemoryError if memory can't hold them."""
+        if max(self.vertices, self.triangles) > MOST:
+            raise ValueError(
+                f"scene: has {self.vertices} vertices and {self.triangles} triangles, expected at most {MOST}"
+            )
+        if self.steps > MOST_STEPS:
+            raise ValueError(
+                f"scene: places its copies in {self.steps:,} steps, expected at most {MOST_STEPS:,}: "
+                "export the copies as one mesh"
+            )
+        # Placed in double; then joined, in half of that.
+        expect_room(3 * (self.vertices + self.triangles), np.float64)
+
+
+NOTHING = Counts(0, 0, 0)
 
 
 def joined(parts: Iterable[Part]) -> Mesh:

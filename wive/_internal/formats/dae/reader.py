@@ -16,7 +16,7 @@ from wive._internal.formats import Mesh
 from wive._internal.formats.dae.geometry import Geometry, read_geometry
 from wive._internal.formats.dae.tree import Document, Element
 from wive._internal.formats.named import named
-from wive._internal.formats.placing import IDENTITY, Matrix, check_counts, joined
+from wive._internal.formats.placing import IDENTITY, NOTHING, Counts, Matrix, joined
 
 DRAWN = ("instance_geometry", "node", "instance_node", "instance_controller")
 
@@ -43,12 +43,12 @@ class Scene:
         self._root = document.target(instance, "url", "visual_scene")
         self._geometries: dict[int, Geometry] = {}  # by id() of elements, as all below
         self._matrices: dict[int, Matrix] = {}
-        self._counts: dict[int, tuple[int, int]] = {}
+        self._counts: dict[int, Counts] = {}
 
     def mesh(self) -> Mesh:
         """All copies of geometries, joined."""
         self._count()
-        check_counts(*self._counts[id(self._root)])
+        self._counts[id(self._root)].check()
         return joined(self._draw())
 
     def _below(self, node: Element) -> list[Element]:
@@ -76,7 +76,7 @@ class Scene:
                 stack.pop()
             elif element.tag == "geometry":
                 one = self._geometries[key] = read_geometry(self._document, element, self._name)
-                self._counts[key] = len(one.vertices), len(one.triangles)
+                self._counts[key] = Counts.of(len(one.vertices), len(one.triangles))
             else:
                 below = self._below(element)
                 missing = {id(one): one for one in below if id(one) not in self._counts}
@@ -85,10 +85,8 @@ class Scene:
                 entered.add(key)
                 stack += missing.values()
                 if not missing:
-                    counts = [self._counts[id(one)] for one in below]
-                    total = sum(vertices for vertices, _ in counts), sum(triangles for _, triangles in counts)
-                    self._counts[key] = total
-                    if total != (0, 0):  # others may be of cameras, with transforms that are not read
+                    self._counts[key] = Counts.of(0, 0, [self._counts[id(one)] for one in below])
+                    if self._counts[key] is not NOTHING:  # others may be of cameras, with other transforms
                         self._matrices[key] = matrix_of(element)
 
     def _draw(self) -> Iterator[tuple[NDArray[Any], NDArray[np.int32], Matrix]]:
@@ -96,7 +94,7 @@ class Scene:
         stack: list[tuple[Element, Matrix]] = [(self._root, IDENTITY)]
         while stack:
             element, outer = stack.pop()
-            if self._counts[id(element)] == (0, 0):  # nested empty nodes may have copies without number
+            if self._counts[id(element)] is NOTHING:  # nested empty nodes may have copies without number
                 continue
             if element.tag == "geometry":
                 one = self._geometries[id(element)]

@@ -21,7 +21,7 @@ from wive._internal.formats.gltf.fields import Fields, index_of, members, object
 from wive._internal.formats.gltf.nodes import Drawn, Scene
 from wive._internal.formats.gltf.pose import default_weights, joint_matrices, morphed, skinned
 from wive._internal.formats.named import named
-from wive._internal.formats.placing import IDENTITY, Matrix, Part, check_counts, joined
+from wive._internal.formats.placing import IDENTITY, Counts, Matrix, Part, joined
 from wive._internal.formats.triangulate import fan, strip
 
 LISTS, FAN = 4, 6  # modes; 5 is a strip
@@ -55,10 +55,11 @@ def _read(document: Document) -> Mesh:
     scene = Scene(document)
     meshes = Meshes(document, scene)
     sizes = [(meshes.size(drawn), len(drawn.matrices)) for drawn in scene.drawn]
-    check_counts(
+    Counts(
         sum(vertices * copies for (vertices, _), copies in sizes),
         sum(triangles * copies for (_, triangles), copies in sizes),
-    )
+        0,  # no node is in several places
+    ).check()
     return joined(meshes.part(drawn) for drawn in scene.drawn)
 
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from wive._internal.archives import Archive
 from wive._internal.formats import Mesh
 from wive._internal.formats.named import named
-from wive._internal.formats.placing import IDENTITY, Matrix, check_counts, joined
+from wive._internal.formats.placing import IDENTITY, NOTHING, Counts, Matrix, joined
 from wive._internal.formats.threemf.part import Object, Part, Reference
 from wive._internal.formats.xml_events import Attributes, Handler, parse
 
@@ -111,9 +111,8 @@ def _read(package: Package) -> Mesh:
     root = package.part(package.root, "_rels/.rels")
     if not root.items:
         raise ValueError(f"{package.root}: build: has no item, so no object is placed")
-    counts: dict[int, tuple[int, int]] = {}  # vertices and triangles of an object and its components, by id()
-    totals = [count(package, package.root, item, counts) for item in root.items]
-    check_counts(sum(vertices for vertices, _ in totals), sum(triangles for _, triangles in totals))
+    counts: dict[int, Counts] = {}  # of an object and its components, by id()
+    Counts.of(0, 0, [count(package, package.root, item, counts) for item in root.items]).check()
     return joined(draw(package, root, counts))
 
 
@@ -132,10 +131,8 @@ def target(package: Package, path: str, reference: Reference) -> tuple[str, Obje
     return path, found
 
 
-def count(
-    package: Package, path: str, reference: Reference, counts: dict[int, tuple[int, int]]
-) -> tuple[int, int]:
-    """Vertices and triangles that a reference places."""
+def count(package: Package, path: str, reference: Reference, counts: dict[int, Counts]) -> Counts:
+    """What a reference places."""
     stack = [target(package, path, reference)]
     first = stack[0][1]
     entered: set[int] = set()
@@ -147,10 +144,8 @@ def count(
         below = [target(package, path, component) for component in found.components]
         missing = {id(one): (path, one) for path, one in below if id(one) not in counts}
         if not missing:
-            vertices, triangles = len(found.vertices), len(found.triangles)
-            for _, one in below:
-                vertices, triangles = vertices + counts[id(one)][0], triangles + counts[id(one)][1]
-            counts[id(found)] = vertices, triangles
+            inner = [counts[id(one)] for _, one in below]
+            counts[id(found)] = Counts.of(len(found.vertices), len(found.triangles), inner)
         elif id(found) in entered:
             raise ValueError(f"{found.place}: is a component of itself: the file is damaged")
         else:
@@ -160,14 +155,14 @@ def count(
 
 
 def draw(
-    package: Package, root: Part, counts: dict[int, tuple[int, int]]
+    package: Package, root: Part, counts: dict[int, Counts]
 ) -> Iterator[tuple[NDArray[Any], NDArray[np.int32], Matrix]]:
     """Vertices, corners and matrix of each copy of a mesh, in order."""
     stack = [(package.root, item, IDENTITY) for item in reversed(root.items)]
     while stack:
         path, reference, outer = stack.pop()
         path, found = target(package, path, reference)
-        if counts[id(found)] == (0, 0):  # nested empty objects may have copies without number
+        if counts[id(found)] is NOTHING:  # nested empty objects may have copies without number
             continue
         matrix = outer if reference.matrix is IDENTITY else outer @ reference.matrix
         if len(found.vertices):
