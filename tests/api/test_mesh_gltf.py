@@ -1,5 +1,7 @@
 """glTF files: triangles are the document's in its order and place, or the file is refused."""
 
+import tracemalloc
+
 import numpy as np
 import pytest
 from support.gltf_files import (
@@ -246,3 +248,18 @@ def test_what_the_scene_does_not_use_may_be_anything():
     model.json["nodes"].append({"mesh": 99})
     model.json["buffers"].append({"uri": "../animation.bin", "byteLength": 10**15})
     assert (corners(model.glb()) == CORNERS).all()
+
+
+def test_instances_beyond_the_range_of_indices_are_refused_before_their_matrices_are_made():
+    model = Model()
+    position = model.accessor(componentType=5126, count=30_000, type="VEC3")
+    mesh = model.mesh(primitive(position))
+    instancing = {"attributes": {"TRANSLATION": model.array(np.zeros((1000, 3)), "f4")}}
+    for _ in range(400):
+        model.node(mesh=mesh, extensions={"EXT_mesh_gpu_instancing": instancing})
+    data = model.glb()
+    tracemalloc.start()
+    assert refusal(data).startswith("scene: has 12000000000 vertices")
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert peak < 5_000_000

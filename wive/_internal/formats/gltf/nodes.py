@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wive._internal.formats.gltf.accessors import describe, values
+from wive._internal.formats.gltf.accessors import Accessor, describe, values
 from wive._internal.formats.gltf.document import Document
 from wive._internal.formats.gltf.fields import (
     Fields,
@@ -30,12 +30,29 @@ AT_REST = {"translation": (0.0, 0.0, 0.0), "rotation": (0.0, 0.0, 0.0, 1.0), "sc
 
 @dataclass(frozen=True)
 class Drawn:
-    """A mesh that a node draws: once per matrix of `matrices` (k,4,4), from the mesh to the world."""
+    """A mesh that a node draws, in as many copies as its instances have.
+
+    `world` (4,4) is the node's matrix to the world; `instances` are the accessors of EXT_mesh_gpu_instancing.
+    """
 
     mesh: int
     place: str
     node: Fields
-    matrices: Matrix
+    world: Matrix
+    copies: int = 1
+    instances: dict[str, Accessor] | None = None
+
+    def matrices(self, document: Document) -> Matrix:
+        """Matrices (k,4,4) of the copies, from the mesh to the world."""
+        if self.instances is None:
+            return self.world[None]
+        parts = {
+            key: values(document, self.instances[key]).astype(np.float64)
+            if key in self.instances
+            else np.tile(value, (self.copies, 1))
+            for key, value in AT_REST.items()
+        }
+        return self.world @ composed(**parts, places=[f"{self.place}: EXT_mesh_gpu_instancing"] * self.copies)
 
 
 class Scene:
@@ -53,11 +70,12 @@ class Scene:
         for visit in visits:
             mesh = index_of(visit.node, "mesh", visit.place)
             if mesh is not None and visit.visible:
-                matrices = instances(document, visit.node, self.worlds[visit.number], visit.place)
-                self.drawn.append(Drawn(mesh, visit.place, visit.node, matrices))
+                copies, found = instances(document, visit.node, visit.place)
+                world = self.worlds[visit.number]
+                self.drawn.append(Drawn(mesh, visit.place, visit.node, world, copies, found))
         if "nodes" not in document.root and "scene" not in document.root:
             meshes = range(len(listed(document.root, "meshes", "document")))  # a library of meshes: each once
-            self.drawn = [Drawn(mesh, "document", {}, IDENTITY[None]) for mesh in meshes]
+            self.drawn = [Drawn(mesh, "document", {}, IDENTITY) for mesh in meshes]
 
 
 class Visit(NamedTuple):
@@ -147,11 +165,11 @@ def composed(translation: Matrix, rotation: Matrix, scale: Matrix, places: list[
     return result
 
 
-def instances(document: Document, node: Fields, world: Matrix, place: str) -> Matrix:
-    """The matrices (k,4,4) of a node's mesh: one, or those of EXT_mesh_gpu_instancing."""
+def instances(document: Document, node: Fields, place: str) -> tuple[int, dict[str, Accessor] | None]:
+    """How many copies a node draws, and the accessors that place them, if it has EXT_mesh_gpu_instancing."""
     extensions = members(node, "extensions", place)
     if "EXT_mesh_gpu_instancing" not in extensions:
-        return world[None]
+        return 1, None
     here = f"{place}: EXT_mesh_gpu_instancing"
     if "skin" in node:
         raise ValueError(f"{here}: is not read together with a skin")
@@ -170,12 +188,7 @@ def instances(document: Document, node: Fields, world: Matrix, place: str) -> Ma
     }
     if len(counts) != 1:
         raise ValueError(f"{here}: expected attributes of one count, found {short(sorted(counts))}")
-    (count,) = counts
-    parts = {
-        key: values(document, found[key]).astype(np.float64) if key in found else np.tile(value, (count, 1))
-        for key, value in AT_REST.items()
-    }
-    return world @ composed(**parts, places=[here] * count)
+    return counts.pop(), found
 
 
 def shown(node: Fields, place: str) -> bool:

@@ -23,7 +23,9 @@ from wive._internal.formats.gltf.pose import default_weights, joint_matrices, mo
 from wive._internal.formats.named import named
 from wive._internal.formats.placing import IDENTITY, Counts, Matrix, Part, joined
 from wive._internal.formats.triangulate import fan, strip
+from wive._internal.room import expect_room
 
+MATRIX = 16  # numbers
 LISTS, FAN = 4, 6  # modes; 5 is a strip
 Shape = tuple[NDArray[Any], NDArray[np.int32]]  # positions and corners of a primitive, in its mesh
 
@@ -54,7 +56,9 @@ def read(data: bytes, name: str, folder: str | None) -> Mesh:
 def _read(document: Document) -> Mesh:
     scene = Scene(document)
     meshes = Meshes(document, scene)
-    sizes = [(meshes.size(drawn), len(drawn.matrices)) for drawn in scene.drawn]
+    sizes = [(meshes.size(drawn), drawn.copies) for drawn in scene.drawn]
+    # Made one node at a time, then joined.
+    expect_room(2 * MATRIX * sum(copies for _, copies in sizes), np.float64)
     Counts(
         sum(vertices * copies for (vertices, _), copies in sizes),
         sum(triangles * copies for (_, triangles), copies in sizes),
@@ -86,10 +90,10 @@ class Meshes:
         if "skin" in drawn.node:  # joints move the vertices to the world, whatever moves the node
             return *self._posed(drawn), IDENTITY[None]
         if "weights" in drawn.node:
-            return *self._posed(drawn), drawn.matrices
+            return *self._posed(drawn), drawn.matrices(self._document)
         if drawn.mesh not in self._rigid:
             self._rigid[drawn.mesh] = self._posed(drawn)
-        return *self._rigid[drawn.mesh], drawn.matrices
+        return *self._rigid[drawn.mesh], drawn.matrices(self._document)
 
     def _posed(self, drawn: Drawn) -> Shape:
         """The mesh by the node's or its own weights and by the node's skin."""
