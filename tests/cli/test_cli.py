@@ -356,3 +356,15 @@ def test_bad_options_are_refused_before_the_progress_bar(ball, tmp_path, capsys,
     )
     error = capsys.readouterr().err
     assert error.startswith("wive: error: ") and error.count("\n") == 1
+
+
+def test_a_flat_mesh_is_seen_from_above_without_an_up(tmp_path, capsys):
+    pytest.importorskip("PIL")
+    np.savez(tmp_path / "flat.npz", vertices=[[0, 0, 0], [1, 0, 0], [0, 1, 0]], faces=[[0, 1, 2]])
+    command = ["render", str(tmp_path / "flat.npz"), "-o", str(tmp_path / "o.png"), "--target", "0", "0", "0"]
+    small = ["--width", "8", "--height", "8", "--spp", "1"]
+    assert main([*command, *small, "--eye", "0", "0", "5"]) == 0
+    capsys.readouterr()
+    for eye, expected in (("inf", "eye must be finite"), ("0", "eye and target must differ")):
+        assert main([*command, *small, "--eye", "0", "0", eye]) == 2
+        assert capsys.readouterr().err.startswith(f"wive: error: {expected}")

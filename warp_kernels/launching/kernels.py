@@ -74,9 +74,7 @@ def make_kernel(
         tmax: wp.array(dtype=real),
         i: int,
     ) -> frame_type:
-        return load_frame(
-            tree.center, origins[i], directions[i], value_of(tmin, i), value_of(tmax, i)
-        )
+        return load_frame(tree.center, origins[i], directions[i], value_of(tmin, i), value_of(tmax, i))
 
     @wp.func
     def trace(tree: tree_type, ray: frame_type, lane: int, found: found_type) -> result_type:

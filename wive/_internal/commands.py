@@ -30,6 +30,8 @@ from wive.meshfile import load_mesh
 from wive.rendering import check_png_output, render_counted, write_png
 from wive.scene import Scene
 
+# Sine of an angle: a nearer `up` is along the view.
+ALONG_VIEW = 1e-6
 # Rays per step of the progress bar.
 BATCH_RAYS = 500_000
 
@@ -161,7 +163,14 @@ def _camera(options: Namespace, scene: Scene) -> Camera:
     else:
         camera = Camera.framing(scene.bounds, options.up, aspect=options.width / options.height, **fov)
     given = {name: getattr(options, name) for name in ("eye", "target", "up", "fov")}
-    return replace(camera, **{name: value for name, value in given.items() if value is not None})
+    given = {name: value for name, value in given.items() if value is not None}
+    if "up" not in given:  # a view along the automatic up, as from above, has the next axis up
+        with np.errstate(all="ignore"):  # cameras of no sense are refused below
+            view = np.subtract(given.get("target", camera.target), given.get("eye", camera.eye))
+            aside = np.cross(view, np.asarray(camera.up))
+            if np.max(abs(aside)) <= ALONG_VIEW * np.max(abs(view)):
+                given["up"] = np.roll(camera.up, -1)
+    return replace(camera, **given)
 
 
 def _read_rays(name: str, real: Real, exact: bool) -> tuple[Floats, ...]:
