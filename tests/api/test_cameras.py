@@ -72,7 +72,9 @@ def test_framing_with_an_up_of_no_sense(value, kind):
         refused(kind, "up", lambda: wive.Camera.framing(BOX, value))
 
 
-@pytest.mark.parametrize(("value", "kind"), [*NO_NUMBERS, (180, ValueError), (200, ValueError)])
+@pytest.mark.parametrize(
+    ("value", "kind"), [*NO_NUMBERS, (180, ValueError), (200, ValueError), (np.ma.masked, TypeError)]
+)
 def test_a_field_of_view_of_no_sense(value, kind):
     refused(kind, "fov", lambda: wive.Camera(**GOOD, fov=value))
     refused(kind, "fov", lambda: wive.Camera.framing(BOX, fov=value))
