@@ -85,6 +85,12 @@ def test_matrices_of_nodes_are_multiplied_in_double_precision():
     assert np.abs(wive.load_mesh(model.glb(), np.float64)[0] - expected).max() < 1e-7
 
 
+def test_the_last_row_of_a_matrix_may_have_been_rounded():
+    model, position, indices = square()
+    model.node(mesh=model.mesh(primitive(position, indices)), matrix=[*np.eye(4).ravel()[:15], 0.9999999])
+    assert (wive.load_mesh(model.glb())[0] == SQUARE).all()
+
+
 def test_normals_of_mirrored_meshes_point_outwards():
     model, position, indices = square()
     mesh = model.mesh(primitive(position, indices))

@@ -253,7 +253,11 @@ def change(model: Model, path: str, value: object) -> None:
         ("nodes/0/mesh", 1, "nodes[0]: refers to meshes[1], expected an index below 1"),
         ("nodes/0/children", [0], "nodes[0]: is reached a second time, by nodes[0]"),
         ("nodes/0/matrix", [1, 0, 0], "nodes[0]: matrix: expected 16 finite numbers"),
-        ("nodes/0/matrix", [0] * 16, "nodes[0]: matrix: expected a last row of 0 0 0 1"),
+        (
+            "nodes/0/matrix",
+            [0] * 16,
+            "nodes[0]: matrix: expected finite numbers and a last row of 0 0 0 1, found 0 0 0 0",
+        ),
         (
             "nodes/0",
             {"mesh": 0, "matrix": [1] * 16, "scale": [1, 1, 1]},

@@ -20,6 +20,7 @@ BATCH = 1 << 16  # vertices placed at once: their coordinates stay in the cache
 MOST = 2**31 - 1  # vertices and triangles are numbered by int32
 # Nodes that hold copies of nodes make any number of them from a small file: so many take half a minute.
 MOST_STEPS = 1 << 23
+LAST_ROW_ERROR = 1e-5  # products of float32 matrices
 
 
 class Counts(NamedTuple):
@@ -52,6 +53,17 @@ class Counts(NamedTuple):
 
 
 NOTHING = Counts(0, 0, 0)
+
+
+def affine(matrix: Matrix, place: str) -> Matrix:
+    """The matrix (4,4) with a last row of exactly 0 0 0 1, which exporters may have rounded.
+
+    Raises ValueError if it is farther from that, or if a number is not finite.
+    """
+    if not (np.isfinite(matrix).all() and np.abs(matrix[3] - IDENTITY[3]).max() <= LAST_ROW_ERROR):
+        row = " ".join(f"{number:g}" for number in matrix[3].tolist())
+        raise ValueError(f"{place}: expected finite numbers and a last row of 0 0 0 1, found {row}")
+    return np.vstack([matrix[:3], IDENTITY[3:]])
 
 
 def joined(parts: Iterable[Part]) -> Mesh:

@@ -16,7 +16,7 @@ from wive._internal.formats import Mesh
 from wive._internal.formats.dae.geometry import Geometry, read_geometry
 from wive._internal.formats.dae.tree import Document, Element
 from wive._internal.formats.named import named
-from wive._internal.formats.placing import IDENTITY, NOTHING, Counts, Matrix, joined
+from wive._internal.formats.placing import IDENTITY, NOTHING, Counts, Matrix, affine, joined
 
 DRAWN = ("instance_geometry", "node", "instance_node", "instance_controller")
 
@@ -111,7 +111,7 @@ def matrix_of(node: Element) -> Matrix:
     for child in node.all("matrix", "translate", "rotate", "scale", "lookat", "skew"):
         matrix = np.eye(4)
         if child.tag == "matrix":
-            matrix = child.numbers(16).reshape(4, 4)
+            matrix = affine(child.numbers(16).reshape(4, 4), child.place)
         elif child.tag == "translate":
             matrix[:3, 3] = child.numbers(3)
         elif child.tag == "scale":
@@ -120,8 +120,8 @@ def matrix_of(node: Element) -> Matrix:
             matrix[:3, :3] = rotation(child)
         else:
             raise ValueError(f"{child.place}: is not read: export the node with a matrix")
-        if (matrix[3] != IDENTITY[3]).any() or not np.isfinite(matrix).all():
-            raise ValueError(f"{child.place}: expected finite numbers, and a last row of 0 0 0 1")
+        if not np.isfinite(matrix).all():
+            raise ValueError(f"{child.place}: expected finite numbers")
         result = matrix if result is IDENTITY else result @ matrix
     return result
 

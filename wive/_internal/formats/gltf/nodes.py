@@ -23,7 +23,7 @@ from wive._internal.formats.gltf.fields import (
     short,
     whole,
 )
-from wive._internal.formats.placing import IDENTITY, Matrix
+from wive._internal.formats.placing import IDENTITY, Matrix, affine
 
 AT_REST = {"translation": (0.0, 0.0, 0.0), "rotation": (0.0, 0.0, 0.0, 1.0), "scale": (1.0, 1.0, 1.0)}
 
@@ -134,13 +134,10 @@ def local_matrices(nodes: list[Fields], places: list[str]) -> Matrix:
         for key in moved:
             parts[key][at] = numbers(node, key, place, len(AT_REST[key]))
         if "matrix" in node:
-            given[at] = matrix = numbers(node, "matrix", place, 16).reshape(4, 4).T  # column-major
             if moved:
                 raise ValueError(f"{place}: has both matrix and {moved[0]}, expected one of them")
-            if (matrix[3] != IDENTITY[3]).any():
-                raise ValueError(
-                    f"{place}: matrix: expected a last row of 0 0 0 1, found {short(matrix[3].tolist())}"
-                )
+            column_major = numbers(node, "matrix", place, 16).reshape(4, 4)
+            given[at] = affine(column_major.T, f"{place}: matrix")
     result = composed(**parts, places=places)
     for at, matrix in given.items():
         result[at] = matrix
