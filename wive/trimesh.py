@@ -25,10 +25,11 @@ LEAST_SQUARED = 1e-280  # shorter vectors lose digits when they are squared
 class RayMeshIntersector:
     """Ray queries on a `trimesh.Trimesh`, with the methods of trimesh's own intersectors.
 
-    Coordinates are converted to `dtype` relative to the mesh's centre, directions to unit vectors. The tree
-    is built when first needed, and again after the mesh's hash has changed; making an intersector costs
-    nothing, and the mesh may get its data later. Triangles with a corner that is NaN or infinite are never
-    hit. Can be pickled and copied.
+    Coordinates are converted to `dtype` relative to the mesh's centre, directions to unit vectors. Origins
+    far away are first moved along their rays to where the mesh is near, in float64. The tree is built when
+    first needed, and again after the mesh's hash has changed; making an intersector costs nothing, and the
+    mesh may get its data later. Triangles with a corner that is NaN or infinite are never hit. Can be
+    pickled and copied.
     """
 
     def __init__(
@@ -58,7 +59,9 @@ class RayMeshIntersector:
         # A primitive makes its vertices when they are asked for: its class says that it has some.
         has = type(geometry), getattr(geometry, "__dict__", ())
         missing = [
-            name for name in ("vertices", "faces", "bounds") if not (hasattr(has[0], name) or name in has[1])
+            name
+            for name in ("vertices", "faces", "bounds")
+            if isinstance(geometry, type) or not (hasattr(has[0], name) or name in has[1])
         ]
         if missing:
             raise TypeError(

@@ -38,6 +38,24 @@ def test_rays_from_far_away_hit_what_they_hit_from_near_by(backend, accuracy, no
         assert (np.diff(every.t.reshape(-1, 2)) >= 0).all()
 
 
+@pytest.mark.parametrize("distance", [1e14, 1e15, 1e16, 1e17, 9e17])
+def test_rays_start_before_the_scene_even_if_float64_does_not_resolve_it(backend, distance):
+    """From 1e16 on, neighbouring doubles are farther apart than the scene is large."""
+    scene = wive.Scene(*sphere(3), backend=backend)
+    axes = np.concatenate([np.eye(3), -np.eye(3)])
+    beside = np.roll(axes, 1, axis=1) * 0.125 + np.roll(axes, 2, axis=1) * 0.25
+    near = scene.intersect(beside - 3 * axes, axes)
+    hits = scene.intersect(beside - distance * axes, 2 * axes)
+    assert near.mask.all()
+    np.testing.assert_array_equal(hits.prim, near.prim)
+    np.testing.assert_allclose(hits.points(), near.points(), rtol=0, atol=1e-6)
+    np.testing.assert_array_equal(hits.t, np.float32(distance / 2))
+    assert (scene.count(beside - distance * axes, axes) == 2).all()
+    assert scene.occluded(beside - distance * axes, axes).all()
+    assert not scene.occluded(beside - distance * axes, -axes).any()
+    assert scene.occluded(beside - distance * axes, -axes, tmin=-np.inf).all()
+
+
 def test_limits_are_those_of_t_from_afar(backend, aimed):
     scene = wive.Scene(*sphere(3), backend=backend)
     targets, directions = aimed

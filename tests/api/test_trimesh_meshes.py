@@ -154,11 +154,48 @@ def test_a_sphere_is_hit_from_any_distance(accuracy, place):
         assert not ours.intersects_any(rays[0], -directions).any()
 
 
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_an_origin_may_be_any_number(dtype):
+    """Beyond 1e16 sizes doubles do not resolve the mesh along the ray, beyond 1e18 scenes take no origins."""
+    vertices, faces = sphere(3)
+    for size in (1e-30, 1, 1e12, 1e30):
+        ours = RayMeshIntersector(
+            trimesh.Trimesh(vertices.astype(float) * size, faces, process=False), dtype=dtype
+        )
+        directions = np.array([[0, 0, 1.0], [0, -1, 0]])
+        targets = size * np.array([[0.125, 0.25, 0], [0.25, 0, 0.125]])
+        near = ours.intersects_location(targets - 3 * size * directions, directions)
+        assert len(near[0]) == 4
+        for distance in (1e6, 1e9, 1e15, 1e17, 1e20, 1e100, 1e250):
+            origins = targets - size * distance * directions
+            for mine, other in zip(ours.intersects_location(origins, directions), near, strict=True):
+                np.testing.assert_allclose(mine, other, rtol=0, atol=1e-12 * size)
+            assert ours.intersects_any(origins, directions).all()
+            assert not ours.intersects_any(origins, -directions).any()
+        assert not ours.intersects_any([[np.inf, 0, 0], [0, 0, 1.7e308]], [[-1, 0, 0], [0, 1, 0.0]]).any()
+
+
+@pytest.mark.parametrize("size", [1e-90, 1e160, 1e300])
+def test_a_mesh_may_have_any_size(size):
+    vertices, faces = sphere(3)
+    ours = RayMeshIntersector(trimesh.Trimesh(vertices.astype(float) * size, faces, process=False))
+    points, rays, _ = ours.intersects_location([[0.1 * size, 0.2 * size, -5 * size]], [[0, 0, 1.0]])
+    assert rays.tolist() == [0, 0]
+    np.testing.assert_allclose(points / size, [[0.1, 0.2, -0.972], [0.1, 0.2, 0.972]], atol=1e-3)
+    assert ours.contains_points(np.array([[0.1, 0.2, 0.3], [0.9, 0.9, 0.9]]) * size).tolist() == [True, False]
+
+
 def test_directions_of_any_length_are_directions(box):
     ours = RayMeshIntersector(box)
     for length in (1e-320, 1e-200, 1e-3, 1e200, 1e308):
         found = ours.intersects_location(ORIGINS[:1], DIRECTIONS[:1] * length)
         np.testing.assert_allclose(found[0][:, 2], [-0.5, 0.5])
+
+
+@pytest.mark.parametrize("bad", [trimesh.Trimesh, trimesh.Scene(), trimesh.PointCloud(np.eye(3)), None])
+def test_what_is_no_mesh_is_refused(bad):
+    with pytest.raises(TypeError, match=r"^geometry must be a trimesh.Trimesh, got \w+ without "):
+        RayMeshIntersector(bad)
 
 
 def test_bad_arguments_are_refused_by_their_names(box):

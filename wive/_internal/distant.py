@@ -6,6 +6,7 @@ Rounding an origin or a direction to float32 moves a ray sideways by up to 1e-7 
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -39,7 +40,7 @@ class Ball(NamedTuple):
         if not np.isfinite(bounds).all():
             return cls(np.zeros(3), 0.0, -np.inf, np.inf)
         low, high = bounds.astype(np.float64)
-        center, radius = low + (high - low) / 2, float(np.linalg.norm(high - low)) / 2
+        center, radius = low + (high - low) / 2, math.hypot(*(high - low)) / 2
         return cls(center, radius, float(center.max()) - FAR * radius, float(center.min()) + FAR * radius)
 
     def may_have_far(self, origins: Floats) -> bool:
@@ -53,24 +54,38 @@ class Ball(NamedTuple):
             lowest, highest = origins.min(), origins.max()
         return not (self.lowest <= lowest and highest <= self.highest)
 
-    def steps(self, origins: Float64, directions: Float64) -> Float64:
+    def steps(self, origins: Float64, directions: Float64, most: float = MOST_COORDINATE) -> Float64:
         """(n,) how far along each ray, in lengths of its direction, it comes near; 0 if it starts near.
 
-        What the line through the ray meets of the scene lies ahead of that place.
+        What the line through the ray meets of the scene lies ahead of that place. Origins with a coordinate
+        beyond `most` stay.
         """
         steps = np.zeros(len(origins))
-        away = self.center - origins
-        distance = np.abs(away).max(axis=1)
-        longest = np.abs(directions).max(axis=1)
-        is_ray = (np.abs(origins).max(axis=1) <= MOST_COORDINATE) & (longest > 0) & np.isfinite(longest)
-        (far,) = np.nonzero((distance > FAR * self.radius) & is_ray)
-        unit = directions[far] / longest[far, None]
-        squared = np.einsum("ij,ij->i", unit, unit)
-        along = np.einsum("ij,ij->i", away[far], unit) / squared - 2 * self.radius / np.sqrt(squared)
-        with np.errstate(over="ignore"):
-            along /= longest[far]
+        with np.errstate(over="ignore", invalid="ignore"):
+            away = self.center - origins
+            distance = np.abs(away).max(axis=1)
+            longest = np.abs(directions).max(axis=1)
+            is_ray = (np.abs(origins).max(axis=1) <= most) & (longest > 0) & np.isfinite(longest)
+            (far,) = np.nonzero((distance > FAR * self.radius) & is_ray)
+            along = self._before(origins[far], directions[far] / longest[far, None]) / longest[far]
         steps[far] = np.where(np.isfinite(along), along, 0)
         return steps
+
+    def starts(self, origins: Float64, directions: Float64, steps: Float64) -> Float64:
+        """(n,3) where rays are after `steps`.
+
+        `steps` and what is added to an origin are rounded to 1e-16 of the way, so that from 1e16 radii away a
+        ray could end up behind the scene: the sum is moved along the ray once more.
+        """
+        unit = directions / np.abs(directions).max(axis=1)[:, None]
+        near = origins + steps[:, None] * directions
+        return np.asarray(near + self._before(near, unit)[:, None] * unit)
+
+    def _before(self, origins: Float64, unit: Float64) -> Float64:
+        """(n,) how far along each ray it enters a ball of twice the radius, if it aims at the center."""
+        squared = np.einsum("ij,ij->i", unit, unit)
+        towards = np.einsum("ij,ij->i", self.center - origins, unit)
+        return np.asarray(towards / squared - 2 * self.radius / np.sqrt(squared))
 
 
 class Moved(NamedTuple):
@@ -111,7 +126,7 @@ def moved(rays: Rays, arrays: Traced, real: Real, ball: Ball) -> Moved | None:
         return None
     low, high = (np.broadcast_to(limit, len(steps)) for limit in arrays[2:])
     near = arrays[0].copy()
-    near[is_moved] = origins[is_moved] + steps[is_moved, None] * directions[is_moved]
+    near[is_moved] = ball.starts(origins[is_moved], directions[is_moved], steps[is_moved])
     nearer = np.where(is_moved, _down(_middle(low, -np.inf) - steps), low)
     farther = np.where(is_moved, -_down(steps - _middle(high, np.inf)), high)
     nearer = np.where(
