@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from support.closed_meshes import DIRECTIONS, SCALES, SHAPES, TETRAHEDRON, Mesh, grid
 from support.flat_pictures import triangles_met
+from support.hard_rays import grid as open_grid
 from support.hard_sets import SETS, hard_set
 from support.meshes import sphere
 from support.oracle import cross, integers, unit_of
@@ -98,6 +99,31 @@ def test_products_that_would_underflow_lose_no_crossing(cpu_backend: str, scale:
             assert hits.mask.all()
             aimed = len(rays[0]) - 2 * len(DIRECTIONS)
             np.testing.assert_allclose(hits.t[:aimed] * factor, 1, rtol=1e-9)
+
+
+@pytest.mark.parametrize(("dtype", "nodes"), KINDS)
+def test_an_open_sheet_is_crossed_once_away_from_its_border(
+    cpu_backend: str, dtype: type, nodes: Nodes
+) -> None:
+    """A wall seen from its middle, at every scale and place, at inner vertices and edges and between them."""
+    sheet = open_grid(40)
+    for case, (scale, place) in enumerate(PLACES):
+        random = np.random.default_rng(case)
+        turn = np.eye(3) if case % 2 else np.linalg.qr(random.standard_normal((3, 3)))[0]
+        vertices = ((sheet[0] / 20 - [1, 1, 0]) @ turn * scale + np.array(place)).astype(dtype)
+        corners = vertices[sheet[1][random.integers(len(sheet[1]), size=2000)]].astype(np.float64)
+        weights = random.random((2000, 2)) * random.integers(2, size=(2000, 2))
+        aims = corners[:, 0] + weights[:, :1] * (corners[:, 1] - corners[:, 0])
+        aims += weights[:, 1:] * (corners[:, 2] - aims)
+        flat = ((aims - np.array(place)) @ turn.T)[:, :2] / scale
+        aims = aims[(abs(flat) < 0.96).all(axis=1)]
+        origin = (np.array([0, 0, 1]) @ turn * scale + np.array(place)).astype(dtype)
+        directions = (aims - origin).astype(dtype)
+        scene = wive.Scene(vertices, sheet[1], backend=cpu_backend, nodes=nodes)
+        for tmin in (0, -np.inf):
+            assert (scene.count(origin, directions, tmin=tmin) == 1).all()
+        assert (scene.count(origin, -directions) == 0).all()
+        assert scene.occluded(origin, directions).all()
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
