@@ -62,6 +62,22 @@ def test_quads_that_were_split_along_other_diagonals_are_one_surface():
         np.testing.assert_array_equal(found, inside)
 
 
+@pytest.mark.parametrize("options", [{}, {"accuracy": "exact"}, {"dtype": np.float64}], ids=str)
+def test_a_second_copy_with_other_triangles_is_the_same_surface(options):
+    """Each copy is closed, and no edge of one is an edge of the other."""
+    for name in ("box", "icosahedron", "annulus"):
+        sizes = {"r_min": 0.5, "r_max": 1.0, "height": 1.0} if name == "annulus" else {}
+        mesh = getattr(trimesh.creation, name)(**sizes)
+        points = 1.05 * np.random.default_rng(5).uniform(*mesh.bounds, (2000, 3))
+        alone = contained(points, mesh.vertices, mesh.faces, **options)
+        assert 0.1 < alone.mean() < 0.95
+        finer = mesh.subdivide()
+        for faces in (finer.faces, finer.faces[:, ::-1]):
+            both = np.vstack([mesh.faces, faces + len(mesh.vertices)])
+            vertices = np.vstack([mesh.vertices, finer.vertices])
+            np.testing.assert_array_equal(contained(points, vertices, both, **options), alone)
+
+
 @pytest.mark.parametrize("offset", [(1, 0, 0), (1, 1, 0), (1, 1, 1), (0.5, 0.5, 0.5), (3, 0, 0)])
 def test_boxes_that_touch_or_share_a_wall_are_solid(offset):
     """Where they overlap, parity says outside, as in trimesh."""

@@ -1,8 +1,9 @@
 """Which points are inside a mesh: rays from there pass its surface an odd number of times.
 
 In a closed mesh each edge is in two triangles, and crossings are counted. In a mesh whose faces are stored
-twice, as two-sided exports are, each place has two crossings, and places are counted. Two boxes that share a
-wall also have two triangles in one place; there, crossings are counted.
+twice, as two-sided exports are, each place has two crossings, and places are counted, whether both copies
+have the same triangles or not. Two boxes that share a wall also have two triangles in one place; there,
+crossings are counted.
 """
 
 from __future__ import annotations
@@ -61,11 +62,10 @@ def counts_by_place(placed: PlacedMesh, threads: int | None) -> bool:
     if len(corners) == 0:
         return False
     degrees = _edge_degrees(corners)
-    if (degrees == 2).all():
-        return False
-    _, first = np.unique(_mixed(corners).sum(axis=1, dtype=np.uint64), return_index=True)
-    if len(first) < len(corners) and (_edge_degrees(corners[first]) % 2 == 0).all():
-        return True
+    if (degrees != 2).any():
+        _, first = np.unique(_mixed(corners).sum(axis=1, dtype=np.uint64), return_index=True)
+        if len(first) < len(corners) and (_edge_degrees(corners[first]) % 2 == 0).all():
+            return True
     return bool((degrees % 2).any()) or _is_doubled_throughout(placed, threads)
 
 
