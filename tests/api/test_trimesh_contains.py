@@ -63,12 +63,14 @@ def test_quads_that_were_split_along_other_diagonals_are_one_surface():
 
 
 @pytest.mark.parametrize("options", [{}, {"accuracy": "exact"}, {"dtype": np.float64}], ids=str)
-def test_a_second_copy_with_other_triangles_is_the_same_surface(options):
-    """Each copy is closed, and no edge of one is an edge of the other."""
+@pytest.mark.parametrize("place", [(0, 0, 0), (0.1, 0.2, 0.3), (448262.25, 5411932.5, 120)])
+def test_a_second_copy_with_other_triangles_is_the_same_surface(options, place):
+    """Each copy is closed, and no edge of one is an edge of the other; far away its vertices are rounded."""
     for name in ("box", "icosahedron", "annulus"):
         sizes = {"r_min": 0.5, "r_max": 1.0, "height": 1.0} if name == "annulus" else {}
         mesh = getattr(trimesh.creation, name)(**sizes)
-        points = 1.05 * np.random.default_rng(5).uniform(*mesh.bounds, (2000, 3))
+        points = 1.05 * np.random.default_rng(5).uniform(*mesh.bounds, (2000, 3)) + place
+        mesh.apply_translation(place)
         alone = contained(points, mesh.vertices, mesh.faces, **options)
         assert 0.1 < alone.mean() < 0.95
         finer = mesh.subdivide()

@@ -17,7 +17,8 @@ Int64 = NDArray[np.int64]
 
 # Hits of one ray that are at most this fraction of the mesh's size apart are in one place.
 SAME_PLACE = 1e-8
-# Differences of t, in units of the scene, that the scene's numbers may hide.
+# Differences of t, in units of the scene, that the scene's numbers may hide; those of float64 also once for
+# each unit that the mesh is away from the coordinates' origin, as its own vertices are rounded.
 UNSURE = {"float32": 2.0**-20, "float64": 2.0**-46}
 
 
@@ -69,6 +70,8 @@ class PlacedMesh:
         self._real = real
         self._ball = Ball.around(self.bounds)
         self.scene = Scene(real.array((self.vertices - self._origin) * self._scale), faces, **options)
+        away = float(np.abs(self._origin).max()) * self._scale
+        self._unsure = UNSURE[self.scene.precision] + UNSURE["float64"] * away
 
     def near(self, origins: Float64, directions: Float64) -> Float64:
         """The origins of rays, those far away moved along their rays to where the mesh is near."""
@@ -97,8 +100,7 @@ class PlacedMesh:
         """All hits, and whether each is in the same place as the one before; None if none is."""
         every = self.scene.intersect_all(*self.rays(origins, directions), threads=threads)
         found, t = Found(every.ray, every.prim, every.uv), every.t
-        unsure = UNSURE[self.scene.precision]
-        (close,) = np.nonzero(t[1:] - t[:-1] <= unsure + unsure * t[1:])
+        (close,) = np.nonzero(t[1:] - t[:-1] <= self._unsure + self._unsure * t[1:])
         close = close[found.ray[close] == found.ray[close + 1]]
         if len(close) == 0:
             return found, None
