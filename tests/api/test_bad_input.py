@@ -53,7 +53,7 @@ def message(error: pytest.ExceptionInfo[Exception]) -> str:
             None,
             FACES,
             TypeError,
-            "vertices must be a (v, 3) array of real numbers, got dtype object: convert it first",
+            "vertices must be a (v, 3) array of real numbers, got NoneType: convert it first",
         ),
         (
             VERTICES,
@@ -231,7 +231,7 @@ def test_a_scene_saved_elsewhere_needs_its_backend_here_unless_it_was_auto(monke
             (ORIGINS, ORIGINS, 0, None),
             {},
             TypeError,
-            "tmax must be a real number or one per ray, got dtype object: convert it first",
+            "tmax must be a real number or one per ray, got NoneType: convert it first",
         ),
         ((ORIGINS, ORIGINS), {"threads": 0}, ValueError, "threads must be from 1 to 2147483647, got 0"),
         ((ORIGINS, ORIGINS), {"threads": 1.5}, TypeError, "threads must be an integer, got float 1.5"),

@@ -338,7 +338,9 @@ def _numeric(
             raise ValueError(f"{name} must be {expected}, got rows of unequal length") from None
         raise unreadable(name, value, error) from None
     if array.dtype.kind not in kinds and array.shape != (0,):
-        raise TypeError(f"{name} must be {expected}, got dtype {array.dtype}: {mend}")
+        is_no_array = array.dtype == object and array.ndim == 0
+        got = type(value).__name__ if is_no_array else f"dtype {array.dtype}"
+        raise TypeError(f"{name} must be {expected}, got {got}: {mend}")
     if not masked and (mask := _mask(value)) is not None:
         raise ValueError(
             f"{name} must be {expected}, got {np.count_nonzero(mask)} that are masked: "
