@@ -175,14 +175,22 @@ def test_an_origin_may_be_any_number(dtype):
         assert not ours.intersects_any([[np.inf, 0, 0], [0, 0, 1.7e308]], [[-1, 0, 0], [0, 1, 0.0]]).any()
 
 
-@pytest.mark.parametrize("size", [1e-90, 1e160, 1e300])
-def test_a_mesh_may_have_any_size(size):
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@pytest.mark.parametrize("size", [1e-300, 1e-160, 1e-130, 1e-105, 1e-90, 1e90, 1e105, 1e160, 1e300])
+def test_a_mesh_may_have_any_size(size, dtype):
     vertices, faces = sphere(3)
-    ours = RayMeshIntersector(trimesh.Trimesh(vertices.astype(float) * size, faces, process=False))
-    points, rays, _ = ours.intersects_location([[0.1 * size, 0.2 * size, -5 * size]], [[0, 0, 1.0]])
-    assert rays.tolist() == [0, 0]
-    np.testing.assert_allclose(points / size, [[0.1, 0.2, -0.972], [0.1, 0.2, 0.972]], atol=1e-3)
-    assert ours.contains_points(np.array([[0.1, 0.2, 0.3], [0.9, 0.9, 0.9]]) * size).tolist() == [True, False]
+    mesh = trimesh.Trimesh(vertices.astype(float) * size, faces, process=False)
+    doubled = trimesh.Trimesh(mesh.vertices, np.vstack([faces, faces[:, ::-1]]), process=False)
+    rays = np.array([[0.1, 0.2, -5], [0, 0, 5.0]]) * size, np.array([[0, 0, 1.0], [0.01, 0, 1]])
+    expected = RayMeshIntersector(trimesh.Trimesh(vertices, faces, process=False)).intersects_location(
+        rays[0] / size, rays[1]
+    )
+    for ours in (RayMeshIntersector(mesh, dtype=dtype), RayMeshIntersector(doubled, dtype=dtype)):
+        points, rows, _ = ours.intersects_location(*rays)
+        assert rows.tolist() == expected[1].tolist() == [0, 0]
+        np.testing.assert_allclose(points / size, expected[0], rtol=0, atol=1e-12)
+        inside = ours.contains_points(np.array([[0.1, 0.2, 0.3], [0.9, 0.9, 0.9]]) * size)
+        assert inside.tolist() == [True, False]
 
 
 def test_directions_of_any_length_are_directions(box):

@@ -108,7 +108,9 @@ def _is_doubled_throughout(placed: PlacedMesh, threads: int | None) -> bool:
 
 def _unit_normals(placed: PlacedMesh, prim: NDArray[np.int32]) -> Float64:
     v0, v1, v2 = placed.vertices[placed.scene.faces[prim]].swapaxes(0, 1)
-    normals = np.cross(v1 - v0, v2 - v0)
+    sides = np.stack([v1 - v0, v2 - v0])
+    sides /= np.abs(sides).max(axis=2, keepdims=True)  # so that no square of a length is too small or large
+    normals = np.cross(*sides)
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     return normals
 

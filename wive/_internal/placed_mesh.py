@@ -17,6 +17,9 @@ Int64 = NDArray[np.int64]
 
 # Hits of one ray that are at most this fraction of the mesh's size apart are in one place.
 SAME_PLACE = 1e-8
+# The largest power of two by which a mesh is scaled, and that up to which products of five lengths are
+# numbers that keep their digits.
+MOST_POWER, PLAIN_POWER = 1000, 200
 # Differences of t, in units of the scene, that the scene's numbers may hide; those of float64 also once for
 # each unit that the mesh is away from the coordinates' origin, as its own vertices are rounded.
 UNSURE = {"float32": 2.0**-20, "float64": 2.0**-46}
@@ -60,12 +63,14 @@ class PlacedMesh:
             corners = self.vertices[faces[whole]].reshape(-1, 3)
             bounds = np.array([corners.min(axis=0), corners.max(axis=0)]) if len(corners) else None
         self.bounds: Float64 = np.array([[np.inf] * 3, [-np.inf] * 3]) if bounds is None else np.array(bounds)
-        self._origin, self._scale, self.size = np.zeros(3), 1.0, 0.0
+        self._origin, self.size, power = np.zeros(3), 0.0, 0
         if bounds is not None:
             self._origin = self.bounds.mean(axis=0)
             self.size = float(np.max(self.bounds[1] - self.bounds[0]))
-            if scale_to_box and 0 < self.size < np.inf:
-                self._scale = 2.0 ** -round(np.log2(self.size))
+        if 0 < self.size < np.inf:
+            power = max(-MOST_POWER, min(-round(np.log2(self.size)), MOST_POWER))
+        self._scale = 2.0**power if scale_to_box else 1.0
+        self._unit = 2.0**power if abs(power) > PLAIN_POWER else 1.0
         self.by_place: bool | None = None  # what `inside.counts_by_place` says, when asked
         self._real = real
         self._ball = Ball.around(self.bounds)
@@ -92,7 +97,12 @@ class PlacedMesh:
     def points(self, found: Found, origins: Float64, directions: Float64) -> Float64:
         """(h,3) points at which rays meet the planes of the triangles they hit, in the mesh's own float64."""
         ray, prim, uv = found
-        return _cpu.points_on_rays(self.vertices, self.scene.faces, prim, uv, ray, origins, directions)
+        vertices, faces, unit = self.vertices, self.scene.faces, self._unit
+        if unit == 1:
+            return _cpu.points_on_rays(vertices, faces, prim, uv, ray, origins, directions)
+        with np.errstate(over="ignore"):  # of origins that the mesh is not ahead of
+            vertices, origins = vertices * unit, origins * unit
+        return _cpu.points_on_rays(vertices, faces, prim, uv, ray, origins, directions) / unit
 
     def every_hit(
         self, origins: Float64, directions: Float64, threads: int | None
