@@ -189,6 +189,26 @@ def test_parity_tells_inside_from_outside(cpu_backend: str, seed: int, dtype: ty
     np.testing.assert_array_equal(counts % 2 == 1, inside)
 
 
+@pytest.mark.parametrize(("dtype", "nodes"), KINDS)
+def test_all_rays_from_one_place_agree_in_parity(cpu_backend: str, dtype: type, nodes: Nodes) -> None:
+    """Two overlapping spheres with spikes and dents, at every scale and place."""
+    random = np.random.default_rng(9)
+    ball, faces = sphere(2)
+    spiked = ball * random.uniform(0.3, 1, (len(ball), 1))
+    both = (
+        np.concatenate([spiked, turned((spiked, faces), random) + 0.3]),
+        np.concatenate([faces, faces + len(ball)]),
+    )
+    for scale, place in PLACES:
+        vertices = (turned(both, random) * scale + np.array(place)).astype(dtype)
+        origins = scale * random.uniform(-1, 1, (6, 3)) + np.array(place)
+        scene = wive.Scene(vertices, both[1], backend=cpu_backend, nodes=nodes)
+        rays = at_hard_places(vertices, both[1], origins)
+        odd = scene.count(*rays).reshape(-1, len(origins)) % 2
+        assert (odd == odd[0]).all()
+        assert (scene.count(*rays, tmin=-np.inf) % 2 == 0).all()
+
+
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
 @pytest.mark.parametrize("name", ["voxels", *SETS])
 def test_every_backend_crosses_the_same_triangles(usable_backends: list[str], name: str, dtype: type) -> None:
