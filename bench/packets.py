@@ -30,6 +30,7 @@ WIDEST = 45.0  # degrees, for cameras so near that the scene would fill more
 WITHOUT_PACKETS = 15  # rays in flight: one fewer than a packet has
 FEWEST_RAYS = 30_000  # that a timing traces: a small batch is repeated
 EFFORT, QUICK_EFFORT = Effort(least=5, most=9), Effort(least=2, most=2)
+LONG_EFFORT, LONG = Effort(least=3, most=3), 1_000_000  # of batches from so many rays on, which scatter less
 COLUMNS = ["scene", "distance", "width", "query", "ratio", "ray_ns", "flights_ns", "single_ns", "rounds"]
 
 
@@ -46,6 +47,7 @@ def main(options: Sequence[str]) -> None:
         for distance in DISTANCES:
             for width in chosen.widths:
                 rays = view(mesh, distance, width)
+                effort = LONG_EFFORT if len(rays) >= LONG else EFFORT
                 for query in QUERIES:
                     rows.append(
                         {
@@ -53,7 +55,7 @@ def main(options: Sequence[str]) -> None:
                             "distance": distance,
                             "width": width,
                             "query": query,
-                            **measured(tree, kernel, rays, query, QUICK_EFFORT if chosen.quick else EFFORT),
+                            **measured(tree, kernel, rays, query, QUICK_EFFORT if chosen.quick else effort),
                         }
                     )
                     report.print_progress(rows[-1], ("scene", "distance", "width", "query", "ratio"))
