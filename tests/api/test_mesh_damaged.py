@@ -1,4 +1,7 @@
-"""Mesh files that are damaged in any way: a mesh, or one line that names the file; never anything else."""
+"""Mesh files that are cut off or claim too much: a mesh, or one line that names the file; never anything else.
+
+Damage of any kind is in tests/fuzz.
+"""
 
 import io
 import tracemalloc
@@ -7,47 +10,10 @@ import zipfile
 import numpy as np
 import pytest
 from support.gltf_files import primitive, square
-from support.mesh_files import TRIANGLE, WHOLE, damaged, npz, ply_binary, ply_text, stl_binary
+from support.mesh_files import TRIANGLE, WHOLE, npz, ply_binary, ply_text, stl_binary
+from support.refusals import load_or_refusal
 
 import wive
-
-
-def load_or_refusal(data: bytes, kind: str, dtype: type = np.float32) -> str:
-    """The refusal's text, "" if there is a mesh: one that a scene takes."""
-    try:
-        vertices, faces = wive.load_mesh(data, dtype, file_type=kind)
-    except ValueError as error:
-        text = str(error)
-        assert text.startswith("mesh (bytes): ")
-        assert "\n" not in text and len(text) < 300
-        return text
-    assert vertices.dtype == dtype and faces.dtype == np.int32
-    assert faces.min() >= 0 and faces.max() < len(vertices)
-    assert np.isfinite(vertices[faces]).all()
-    return ""
-
-
-def check(kind: str, count: int, seed: int) -> None:
-    random = np.random.default_rng(seed)
-    refused = 0
-    for whole in WHOLE[kind]:
-        assert load_or_refusal(whole, kind) == ""
-        for number in range(count):
-            data = damaged(whole, random)
-            refused += load_or_refusal(data, kind, (np.float32, np.float64)[number % 2]) != ""
-    assert refused > count // 2
-
-
-@pytest.mark.parametrize("kind", WHOLE)
-def test_damaged_files_are_read_or_refused(kind):
-    check(kind, 100, seed=31)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("kind", WHOLE)
-@pytest.mark.parametrize("seed", range(4))
-def test_many_damaged_files_are_read_or_refused(kind, seed):
-    check(kind, 5_000, seed)
 
 
 @pytest.mark.parametrize("kind", WHOLE)

@@ -57,6 +57,24 @@ def test_the_writer_is_named_if_the_file_names_it(tmp_path):
         wive.load(path)
 
 
+@pytest.mark.parametrize(
+    "content",
+    [
+        header(options={**OPTIONS, "a\n\x9d\x1b[2J": 1}),
+        header(options={**OPTIONS, "a" * 5000: 1}),
+        header(version=10**4000),
+        header(version=2, wive="3\n\x1b[2J"),
+        header(version=2, wive="3" * 5000),
+    ],
+)
+def test_a_newer_files_words_stay_on_one_short_line(tmp_path, content):
+    path = tmp_path / "scene"
+    write(path, content, **MESH)
+    with pytest.raises(ValueError, match="upgrade wive") as error:
+        wive.load(path)
+    assert str(error.value).isprintable() and len(str(error.value)) < len(str(path)) + 300
+
+
 def test_options_that_are_unknown_are_not_dropped(tmp_path):
     path = tmp_path / "scene"
     write(path, header(options={**OPTIONS, "engine": "x", "cache": 3}), **MESH)

@@ -85,8 +85,9 @@ def refuse_newer(what: str, version: int, options: object, writer: object = None
     unknown = ", ".join(sorted(map(str, options.keys() - OPTIONS))) if isinstance(options, dict) else ""
     if version <= FORMAT_VERSION and not unknown:
         return
-    found = f"of version {version}" if version > FORMAT_VERSION else f"with unknown options ({unknown})"
-    by = f"wive {writer}" if isinstance(writer, str) else "a newer wive"
+    is_newer = version > FORMAT_VERSION
+    found = f"of version {version!s:.40}" if is_newer else f"with unknown options ({one_line(unknown):.100})"
+    by = f"wive {one_line(writer):.40}" if isinstance(writer, str) else "a newer wive"
     raise ValueError(
         f"{what} {found}, written by {by}; this is wive {wive.__version__}, "
         f"which reads version {FORMAT_VERSION}: upgrade wive, or save the scene again with this one"
