@@ -1,13 +1,9 @@
-"""Mesh files that are cut off or claim too much: a mesh, or one line that names the file; never anything else.
-
-Damage of any kind is in tests/fuzz.
-"""
+"""Mesh files that are cut off or claim too much: a mesh, or one line that names the file, nothing else."""
 
 import io
 import tracemalloc
 import zipfile
 
-import numpy as np
 import pytest
 from support.gltf_files import primitive, square
 from support.mesh_files import TRIANGLE, WHOLE, npz, ply_binary, ply_text, stl_binary

@@ -197,3 +197,20 @@ REFUSED = {
 def test_what_can_not_be_right_is_refused_with_its_place(data, expected):
     found = refusal(data, "ply")
     assert found.startswith(expected)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "expected"),
+    [
+        (b"3 3 2 4 1", b"3 3 2 4", "expected more numbers, up to `"),
+        (b"3 3 2 4 1", b"3 3 2 4 1 5", "expected no more numbers than element `"),
+        (b"3 3 2 4 1", b"9 3 2 4 1", "expected all of the list `"),
+        (b"0 1\n", b"0 1\n0 1\n", "expected a line per row, 5 of `"),
+    ],
+)
+def test_long_names_are_cut_in_messages(old, new, expected):
+    header, rows = ply_text().split(b"end_header")
+    for word in (b"quality", b"edge"):
+        header = header.replace(word, word * 200)
+    text = refusal(header + b"end_header" + rows.replace(old, new), "ply")
+    assert expected in text and len(text) < 250

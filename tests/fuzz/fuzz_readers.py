@@ -3,11 +3,11 @@
     pip install --group fuzz
     python tests/fuzz/fuzz_readers.py --format ply -max_total_time=3600
 
-`--format` is a name of `reader_targets.targets`; without it, each runs in turn, all of them even if one fails.
-Arguments with one dash go to libFuzzer: -max_total_time, in seconds, and -runs are for each format. Files that
-reached new code are kept in build/fuzz/FORMAT, where the next run begins. A file that fails is kept as
-build/fuzz/FORMAT-crash-..., and is read again by `--format FORMAT THE_FILE`: make it small and add it to a test
-of tests/api.
+`--format` is a name in `reader_targets.targets`; without it, each runs in turn, all of them even if one
+fails. Arguments with one dash go to libFuzzer: -max_total_time, in seconds, and -runs are per format. Files
+that reached new code are kept in build/fuzz/FORMAT, where the next run begins. A file that fails is kept as
+build/fuzz/FORMAT-crash-..., and is read again by `--format FORMAT THE_FILE`: make it small and add it to a
+test of tests/api.
 """
 
 import argparse
@@ -38,7 +38,9 @@ WORD = re.compile(rb"[A-Za-z_#:/.]{2,40}")
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--format", choices=TARGETS)
     name, rest = parser.parse_known_args()
     if name.format is None:

@@ -20,8 +20,8 @@ from support.threemf_files import package
 
 VERTICES, FACES = np.eye(3, dtype=np.float32), np.array([[0, 1, 2]], np.int32)
 HEADER = (
-    '{"format": "wive scene", "version": 1, "wive": "0.1.0", "options": {"backend": "scalar", "device": null, '
-    '"accuracy": "fast", "nodes": "compressed", "quality": "medium"}}'
+    '{"format": "wive scene", "version": 1, "wive": "0.1.0", "options": {"backend": "scalar", '
+    '"device": null, "accuracy": "fast", "nodes": "compressed", "quality": "medium"}}'
 )
 # They place copies, which may be more than memory holds.
 WITH_COPIES = ("3mf", "dae", "glb", "gltf")
@@ -98,7 +98,7 @@ def targets() -> dict[str, Target]:
     for kind, make in FILES.values():
         files.setdefault(kind, []).append(make())
     result = {kind: Target(mesh(kind), seeds) for kind, seeds in files.items()}
-    result["any"] = Target(mesh(None), sum(files.values(), []))
+    result["any"] = Target(mesh(None), [seed for seeds in files.values() for seed in seeds])
     result["3mf-part"] = Target(mesh("3mf", package), [threemf_model().encode()])
     if find_spec("DracoPy"):
         result["glb-draco"] = Target(mesh("glb", lambda data: compressed(data).glb()), draco())

@@ -17,9 +17,9 @@ def refusal(data: bytes | str, kind: str | None = None) -> str:
 
 
 def load_or_refusal(data: bytes, kind: str | None, dtype: type = np.float32) -> str:
-    """The message of the ValueError after the file name, on one line; "" if there is a mesh that a scene takes.
+    """The message that refuses the file, without its name; "" if there is a mesh that a scene takes.
 
-    Nothing else may be raised.
+    Fails at any other error, and at a message that is not on one line.
     """
     try:
         vertices, faces = wive.load_mesh(data, dtype, file_type=kind)

@@ -22,18 +22,20 @@ class TextTable:
         at, ends = heads.copy(), heads + counts
         for each in element.properties:
             text.check(
-                at < ends, heads, f"expected more numbers, up to `{each.name}` of element `{element.name}`"
+                at < ends,
+                heads,
+                f"expected more numbers, up to `{each.name:.40}` of element `{element.name:.40}`",
             )
             if each.count_type:
                 sizes = text.integers(at)
                 text.check(
-                    (sizes >= 0) & (sizes < ends - at), heads, f"expected all of the list `{each.name}`"
+                    (sizes >= 0) & (sizes < ends - at), heads, f"expected all of the list `{each.name:.40}`"
                 )
                 self._sizes[each.name] = sizes
                 at = at + 1
             self._first[each.name] = at
             at = at + (sizes if each.count_type else 1)
-        text.check(at == ends, heads, f"expected no more numbers than element `{element.name}` has")
+        text.check(at == ends, heads, f"expected no more numbers than element `{element.name:.40}` has")
 
     def numbers(self, properties: list[Property], dtype: np.dtype[Any]) -> NDArray[Any]:
         """A column per property."""
