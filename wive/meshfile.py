@@ -17,6 +17,7 @@ from wive._internal.formats.unread import unread
 from wive._internal.lines import one_line
 from wive._internal.npzfile import check_input
 from wive._internal.precision import FLOAT32, Floats, Real, real_named
+from wive._internal.room import room_for
 from wive._internal.storage import refuse_saved_scene
 
 # Readers of formats that may be text.
@@ -54,7 +55,8 @@ def load_mesh(
             format by its first bytes if this is None.
 
     Raises OSError if the file can't be read, ValueError if it is no mesh, is damaged or has no triangles,
-    ImportError if its format needs a package that is missing. Each message is one line that names the file.
+    ImportError if its format needs a package that is missing, MemoryError if it does not fit into memory.
+    Each message is one line that names the file.
     """
     real = real_named(dtype)
     name, folder, data = _content(source)
@@ -63,16 +65,18 @@ def load_mesh(
         raise ValueError(f"{name}: is empty")
     if packed := compression_of(data):
         raise unread(name, packed)
-    refuse_saved_scene(name, data)
-    return _checked(_read(kind, data, name, folder, real), name, real)
+    with room_for(name):
+        refuse_saved_scene(name, data)
+        return _checked(_read(kind, data, name, folder, real), name, real)
 
 
 def _content(source: MeshSource) -> tuple[str, str | None, bytes]:
     """Name for errors, folder if the file has one, content."""
     if isinstance(source, str | os.PathLike):
         path = check_input(source)
-        with open(path, "rb") as file:
-            return one_line(path), os.path.dirname(os.path.abspath(path)), file.read()
+        name = one_line(path)
+        with room_for(name), open(path, "rb") as file:
+            return name, os.path.dirname(os.path.abspath(path)), file.read()
     if isinstance(source, bytes) and len(source) < LONGEST_NAME and os.path.isfile(source):
         raise ValueError(
             f"mesh (bytes): is the name of a file, not its content: pass {os.fsdecode(source)!r}"

@@ -1,13 +1,12 @@
 """Files that libFuzzer makes, led by the code that they reach: read, or refused in one line.
 
     pip install --group fuzz
-    python tests/fuzz/fuzz_readers.py --format ply -max_total_time=3600
+    python tests/fuzz/fuzz_readers.py --format ply --minutes 60
 
-`--format` is a name in `reader_targets.targets`; without it, each runs in turn, all of them even if one
-fails. Arguments with one dash go to libFuzzer: -max_total_time, in seconds, and -runs are per format. Files
-that reached new code are kept in build/fuzz/FORMAT, where the next run begins. A file that fails is kept as
-build/fuzz/FORMAT-crash-..., and is read again by `--format FORMAT THE_FILE`: make it small and add it to a
-test of tests/api.
+`--format` is a name in `reader_targets.targets`; without it, each runs for its share of the time, all of them
+even if one fails. Other arguments go to libFuzzer. Files that reached new code are kept in build/fuzz/FORMAT,
+where the next run begins. A file that fails is kept as build/fuzz/FORMAT-crash-..., and is read again by
+`--format FORMAT THE_FILE`: make it small and add it to a test of tests/api.
 """
 
 import argparse
@@ -18,6 +17,7 @@ import subprocess
 import sys
 from contextlib import redirect_stderr
 from pathlib import Path
+from typing import NoReturn
 
 import atheris
 
@@ -34,6 +34,7 @@ with redirect_stderr(io.StringIO()), atheris.instrument_imports(include=["wive"]
 FOLDER = ROOT / "build" / "fuzz"
 # What a file of some thousand bytes may take at most: seconds, while its reader is traced, and bytes.
 SECONDS, BYTES = 10, 1 << 30
+START = 3  # seconds that a process takes before it begins
 WORD = re.compile(rb"[A-Za-z_#:/.]{2,40}")
 
 
@@ -42,17 +43,20 @@ def main() -> int:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--format", choices=TARGETS)
-    name, rest = parser.parse_known_args()
-    if name.format is None:
-        runs = {each: subprocess.run([sys.executable, __file__, "--format", each, *rest]) for each in TARGETS}
-        failed = [each for each, run in runs.items() if run.returncode]
-        print(f"failed: {', '.join(failed)}" if failed else f"{len(runs)} formats: no failure")
-        return len(failed)
-    fuzz(name.format, TARGETS[name.format], rest)
-    return 0
+    parser.add_argument("--minutes", type=float)
+    given, rest = parser.parse_known_args()
+    if given.minutes is not None:
+        share = 60 * given.minutes / (1 if given.format else len(TARGETS))
+        rest.append(f"-max_total_time={max(1, round(share) - START)}")
+    if given.format is not None:
+        fuzz(given.format, TARGETS[given.format], rest)
+    runs = {each: subprocess.run([sys.executable, __file__, "--format", each, *rest]) for each in TARGETS}
+    failed = [each for each, run in runs.items() if run.returncode]
+    print(f"failed: {', '.join(failed)}" if failed else f"{len(runs)} formats: no failure")
+    return len(failed)
 
 
-def fuzz(name: str, target: Target, arguments: list[str]) -> None:
+def fuzz(name: str, target: Target, arguments: list[str]) -> NoReturn:
     """Run libFuzzer, which ends the process."""
     found, seeds = FOLDER / name, FOLDER / "seeds" / name
     for folder in (found, seeds):
@@ -71,6 +75,7 @@ def fuzz(name: str, target: Target, arguments: list[str]) -> None:
     resource.setrlimit(resource.RLIMIT_AS, (used + BYTES, resource.RLIM_INFINITY))
     atheris.Setup([sys.argv[0], *options], target.read)
     atheris.Fuzz()
+    raise SystemExit(0)
 
 
 def quoted(word: bytes) -> str:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from support.batches import Batch
+from support.odd_answers import FORMS, answers, case_of, different, scene_of
 from support.odd_arrays import LAYOUTS
 from support.odd_scenes import odd_case
 from support.oracle import truth
@@ -16,48 +16,7 @@ from support.oracle import truth
 import wive
 
 CPU = [name for name, backend in wive.backends().items() if backend.usable and name != "warp"]
-# Dtypes of vertices and rays, accuracy, node form.
-FORMS = {
-    "fast": (np.float32, np.float32, "fast", "float32"),
-    "watertight": (np.float32, np.float32, "watertight", "float32"),
-    "compressed": (np.float32, np.float32, "watertight", "compressed"),
-    "exact": (np.float32, np.float32, "exact", "float32"),
-    "float64": (np.float64, np.float64, "watertight", "float32"),
-    "float64 compressed": (np.float64, np.float64, "watertight", "compressed"),
-    "float64 rays": (np.float32, np.float64, "watertight", "float32"),
-    "float64 rays, exact": (np.float32, np.float64, "exact", "compressed"),
-}
 MOST_EXACT = 9  # rays and triangles compared with fractions, which take a millisecond per pair
-Results = dict[str, bytes]
-
-
-def case_of(seed: int, form: str) -> Batch:
-    dtype, ray_dtype, *_ = FORMS[form]
-    return odd_case(seed, dtype, ray_dtype=ray_dtype)
-
-
-def scene_of(case: Batch, form: str, backend: str = "auto", quality: str = "medium") -> wive.Scene:
-    *_, accuracy, nodes = FORMS[form]
-    return wive.Scene(
-        case.vertices, case.faces, backend=backend, accuracy=accuracy, nodes=nodes, quality=quality
-    )
-
-
-def answers(scene: wive.Scene, case: Batch, **work: int) -> Results:
-    """Every query's results as bits."""
-    rays = case[2:]
-    hits, many = scene.intersect(*rays, **work), scene.intersect_all(*rays, **work)
-    touched = scene.intersect_all(*rays, touching=True, **work)
-    results = {
-        "t": hits.t, "prim": hits.prim, "uv": hits.uv, "occluded": scene.occluded(*rays, **work),
-        "count": scene.count(*rays, **work), "offsets": many.offsets, "all t": many.t, "all prim": many.prim,
-        "all uv": many.uv, "touched": touched.offsets, "touched t": touched.t, "touched prim": touched.prim,
-    }  # fmt: skip
-    return {name: np.ascontiguousarray(array).tobytes() for name, array in results.items()}
-
-
-def different(one: Results, other: Results) -> list[str]:
-    return [name for name in one if one[name] != other[name]]
 
 
 @pytest.mark.parametrize("form", FORMS)
@@ -66,7 +25,9 @@ def test_backends_give_the_same_bits_however_rays_are_traced(form: str, seeds: I
         case = case_of(seed, form)
         alone = answers(scene_of(case, form, "scalar"), case, threads=1, in_flight=1)
         for backend in CPU:
-            scene = scene_of(case, form, backend, quality=("medium", "high")[seed % 2])
+            # In "fast" areas of the largest coordinates overflow, and the tree decides what is found.
+            is_high = form != "fast" and seed % 2 == 1
+            scene = scene_of(case, form, backend, quality="high" if is_high else "medium")
             for in_flight in (1, 5, 24):
                 found = answers(scene, case, threads=1 + seed % 3, in_flight=in_flight)
                 assert different(alone, found) == [], (seed, backend, in_flight)

@@ -10,6 +10,7 @@ from wive._internal.files import PathLike, atomic_write, file_name
 from wive._internal.lines import one_line
 from wive._internal.npzfile import Npz, open_npz
 from wive._internal.precision import Floats
+from wive._internal.room import room_for
 
 FORMAT = "wive scene"
 FORMAT_VERSION = 1
@@ -55,7 +56,7 @@ def read_scene(path: PathLike) -> tuple[Floats, NDArray[np.int32], Options]:
     """
     name = one_line(file_name(path))
     no_scene = f"{name}: not a scene saved by wive"
-    with open_npz(path, "a scene saved by wive") as found:
+    with room_for(name), open_npz(path, "a scene saved by wive") as found:
         header = _header(found[HEADER]) if HEADER in found else None
         if header is None:
             raise ValueError(no_scene)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable
 from xml.parsers import expat
+from xml.parsers.expat import errors
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,6 +58,8 @@ def parse(chunks: Iterable[bytes], handler: Handler) -> None:
         parser.Parse(b"", True)
     except expat.ExpatError as error:
         reason = expat.ErrorString(error.code)
+        if reason == errors.XML_ERROR_NO_MEMORY:
+            raise MemoryError(reason) from None
         raise ValueError(
             f"line {error.lineno}: expected XML ({reason}): the file is cut off or damaged"
         ) from None
