@@ -161,6 +161,15 @@ def turned(triangles: np.ndarray) -> list[list[list[float]]]:
     return sorted(corner for corner in corners if corner[0] == min(corner))
 
 
+def test_draco_data_of_a_type_that_gltf_does_not_have_is_refused():
+    """DracoPy gives None for their data."""
+    pytest.importorskip("DracoPy")
+    data = bytes.fromhex(
+        "445241434f0202010000000200300101020002020101000903a90000020000004503013001100300348288040000803f0e"
+    )
+    assert "POSITION: its data has a type that is not read" in refusal(compressed(data).glb())
+
+
 @pytest.mark.parametrize(
     ("change", "expected"),
     [

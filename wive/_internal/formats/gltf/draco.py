@@ -62,6 +62,8 @@ def unpack(document: Document, primitive: Fields, place: str) -> None:
             if unique not in found:
                 raise ValueError(f"{here}: {key}: its data has no attribute {unique}: the file is damaged")
             arrays[value] = np.asarray(found[unique])
+            if arrays[value].ndim != 2:  # None for types that glTF does not have
+                raise ValueError(f"{here}: {key}: its data has a type that is not read: the file is damaged")
     for index, array in arrays.items():
         fields = document.item("accessors", index, here)
         accessor = describe(document, index, here, str(fields.get("type")))
