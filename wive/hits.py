@@ -13,7 +13,7 @@ from wive._internal.arrays import Library
 from wive._internal.distant import Moved
 from wive._internal.error_bounds import t_error_bounds
 from wive._internal.host_arrays import host_array
-from wive._internal.precision import Floats, real_of
+from wive._internal.precision import FLOAT64, Floats, real_of
 from wive._internal.rays import Rays
 from wive._internal.read_only import ReadOnly
 from wive._internal.spawn import spawn_origins
@@ -128,7 +128,7 @@ class Hits(ReadOnly):
         bounds = t_error_bounds(self.vertices, self.faces, self.prim, self.t, origins, directions)
         if self._moved is None:
             return bounds
-        mesh, t = (self.vertices.astype(np.float64), self.faces), self.t.astype(np.float64)
+        mesh, t = (FLOAT64.array(self.vertices), self.faces), FLOAT64.array(self.t)
         as_given = t_error_bounds(*mesh, self.prim, t, *self._moved.given)
         return np.where(self._moved.steps != 0, as_given, bounds)
 

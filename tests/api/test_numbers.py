@@ -221,3 +221,21 @@ def test_what_holds_no_numbers_is_refused_in_one_line(value):
             call()
         assert str(error.value).startswith(f"{name} must be")
         assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("dtype", [np.float16, np.float32, np.float64])
+@pytest.mark.parametrize("scene_dtype", [np.float32, np.float64])
+def test_signalling_nans_are_nans_without_a_warning(scene_dtype, dtype):
+    """NumPy warns when it converts one; its bits may come from any file."""
+    bits = {2: 0x7D00, 4: 0x7FA00000, 8: 0x7FF4000000000000}[np.dtype(dtype).itemsize]
+    nan = np.array(bits, f"u{np.dtype(dtype).itemsize}").view(dtype)
+    unused = np.concatenate([VERTICES.astype(dtype), np.full((1, 3), nan)]).astype(dtype)
+    scenes = wive.Scene(unused, FACES), wive.Scene(VERTICES.astype(scene_dtype), FACES)
+    rays = np.tile(np.array(RAY[0], dtype), (3, 1)), np.tile(np.array(RAY[1], dtype), (3, 1))
+    tmin = np.array([0, nan, 0], dtype)
+    rays[0][2, 1] = nan
+    for scene in scenes:
+        for z in (-1, -1000):  # the latter is brought near
+            rays[0][:, 2] = z
+            hits = scene.intersect(*rays, tmin)
+            assert hits.mask.tolist() == np.isfinite(hits.error_bound).tolist() == [True, False, False]

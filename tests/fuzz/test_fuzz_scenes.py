@@ -48,6 +48,7 @@ def test_queries_agree_with_each_other(form: str, seeds: Iterator[int]) -> None:
         scene, rays = scene_of(case, form), case[2:]
         hits, many = scene.intersect(*rays), scene.intersect_all(*rays, touching=True)
         assert (hits.mask == scene.occluded(*rays)).all(), seed
+        hits.points(), hits.normals(), hits.spawn(rays[1]), hits.error_bound  # without a warning
         assert (hits.mask == (np.diff(many.offsets) > 0)).all(), seed
         first = many.offsets[:-1][hits.mask]
         assert (many.t[first] == hits.t[hits.mask]).all(), seed
@@ -57,7 +58,8 @@ def test_queries_agree_with_each_other(form: str, seeds: Iterator[int]) -> None:
         with np.errstate(over="ignore"):
             tmin, tmax = (limit.astype(hits.t.dtype) for limit in rays[2:])
         assert ((hits.t >= tmin) & (hits.t <= tmax))[hits.mask].all(), seed
-        assert scene.occluded(*rays[:3], hits.t)[hits.mask].all(), seed
+        if "exact" in form:  # elsewhere the t of a sliver may lie before its box
+            assert scene.occluded(*rays[:3], hits.t)[hits.mask].all(), seed
         assert (scene.count(*rays) == np.diff(scene.intersect_all(*rays).offsets)).all(), seed
         for ray in np.flatnonzero(np.diff(many.offsets) > 1):
             t = many.t[slice(*many.offsets[ray : ray + 2])]

@@ -311,7 +311,7 @@ def _expect_addressable(name: str, rows: NDArray[Any]) -> None:
 
 def _doubles(array: NDArray[Any]) -> NDArray[np.float64]:
     """The numbers as float64, in which those of longdouble may be infinite."""
-    with np.errstate(over="ignore"):
+    with np.errstate(over="ignore", invalid="ignore"):
         return array.astype(np.float64)
 
 

@@ -115,6 +115,11 @@ def moved(rays: Rays, arrays: Traced, real: Real, ball: Ball) -> Moved | None:
         return None
     if real is FLOAT64 or not ball.may_have_far(arrays[0]) or rays.are(np.dtype(np.float32)):
         return None
+    return _moved(rays, arrays, real, ball)
+
+
+@np.errstate(over="ignore", invalid="ignore")  # any numbers may be given, signalling NaN among them
+def _moved(rays: Rays, arrays: Traced, real: Real, ball: Ball) -> Moved | None:
     given = rays.numpy(FLOAT64)
     origins, directions = (rows.astype(np.float64, copy=False) for rows in given[:2])
     steps = ball.steps(origins, directions)
@@ -138,13 +143,11 @@ def moved(rays: Rays, arrays: Traced, real: Real, ball: Ball) -> Moved | None:
 
 def _middle(limit: Floats, towards: float) -> Float64:
     """Halfway to the next float: hits up to there have a t that is rounded to the limit."""
-    with np.errstate(over="ignore"):
-        beyond = np.nextafter(limit, np.float32(towards))
+    beyond = np.nextafter(limit, np.float32(towards))
     return (limit.astype(np.float64) + beyond) / 2
 
 
 def _down(values: Float64) -> Floats:
     """float32 numbers that are not above the values."""
-    with np.errstate(over="ignore"):
-        rounded = values.astype(np.float32)
+    rounded = values.astype(np.float32)
     return np.where(rounded > values, np.nextafter(rounded, np.float32(-np.inf)), rounded)

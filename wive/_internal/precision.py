@@ -32,8 +32,8 @@ class Real:
         if values.dtype is self.dtype and values.flags.c_contiguous and values.flags.aligned:
             return values
         expect_room(values.size, self.dtype)
-        # The caller's floating-point environment would round otherwise.
-        with _cpu.DefaultFloats(), np.errstate(over="ignore"):
+        # The caller's floating-point environment would round otherwise. A signalling NaN is invalid to NumPy.
+        with _cpu.DefaultFloats(), np.errstate(over="ignore", invalid="ignore"):
             return np.require(values, self.dtype, ["C", "A"])
 
     def taken(self, name: str, given: ArrayLike, values: NDArray[Any]) -> Floats:
