@@ -69,6 +69,8 @@ CASES = [(np.float32, 1, "watertight", "float32"), (np.float32, 1e-38, "watertig
          (np.float64, 1, "watertight", "compressed")]
 for backend in backends:
     for dtype, scale, accuracy, nodes in CASES:
+        if backend == "warp" and (dtype, accuracy) == (np.float64, "fast"):
+            accuracy = "watertight"  # whose kernels other tests compile as well
         case = dtype, scale, accuracy, backend, nodes, inputs(dtype, scale)
         usual = answers(*case)
         for name, flags in ENVIRONMENTS.items():
