@@ -10,6 +10,7 @@ from support.mesh_files import TRIANGLE, WHOLE, npz, ply_binary, ply_text, stl_b
 from support.refusals import load_or_refusal
 
 import wive
+from wive import meshfile
 
 
 @pytest.mark.parametrize("kind", WHOLE)
@@ -109,3 +110,10 @@ def test_claims_beyond_the_file_are_refused_before_memory_is_taken(kind, data):
 @pytest.mark.timeout(60)  # if time grows with the square of the size, these take longer
 def test_no_file_takes_time_beyond_its_size(kind, data):
     load_or_refusal(data, kind)
+
+
+@pytest.mark.parametrize("kind", WHOLE)
+def test_more_vertices_than_a_scene_numbers_are_refused(kind, monkeypatch):
+    monkeypatch.setattr(meshfile, "MOST", 2)  # in place of 2**31 - 1
+    for whole in WHOLE[kind]:
+        assert load_or_refusal(whole, kind).endswith(" vertices, more than 2: split the file")
