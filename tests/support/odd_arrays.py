@@ -7,7 +7,7 @@ import numpy as np
 
 Random = np.random.Generator
 REAL = ("f2", "f4", "f8", "g", ">f4", ">f8", "i1", "i2", "i4", "i8", ">i4", "u1", "u2", "u4", "u8")
-NOT_REAL = ("c8", "S4", "U4", "O", "M8[s]", "m8[s]", "V8")
+NOT_REAL = ("?", "c8", "S4", "U4", "O", "M8[s]", "m8[s]", "V8")
 
 
 def odd_array(random: Random, numbers: np.ndarray) -> tuple[Any, np.ndarray | None]:
@@ -50,6 +50,16 @@ def backward(_: Random, array: np.ndarray) -> np.ndarray:
     return array[::-1].copy()[::-1]
 
 
+def mirrored(_: Random, array: np.ndarray) -> np.ndarray:
+    """Numbers of a row that lie in memory from last to first."""
+    return array[..., ::-1].copy()[..., ::-1]
+
+
+def inside(_: Random, array: np.ndarray) -> np.ndarray:
+    """Rows between others of one array, as a batch of a larger one."""
+    return np.concatenate([array, array, array])[len(array) : 2 * len(array)]
+
+
 def fortran(_: Random, array: np.ndarray) -> np.ndarray:
     return np.asfortranarray(array)
 
@@ -84,4 +94,4 @@ class Labelled(np.ndarray):
     """A subclass without a meaning of its own."""
 
 
-LAYOUTS = (strided, backward, fortran, unaligned, read_only, subclass, record)
+LAYOUTS = (strided, backward, mirrored, inside, fortran, unaligned, read_only, subclass, record)
