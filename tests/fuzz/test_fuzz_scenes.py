@@ -113,7 +113,8 @@ def test_exact_hits_are_those_of_fractions(seeds: Iterator[int]) -> None:
         assert (hits.t == right.t).all(), seed
 
 
-@pytest.mark.parametrize("form", ["fast", "compressed", "exact", "float64"])
+# Not "fast": it may put the t of slivers of mixed scales before their boxes, and the tree decides what is found.
+@pytest.mark.parametrize("form", ["watertight", "compressed", "exact", "float64"])
 def test_a_refit_there_and_back_gives_the_hits_of_new_scenes(form: str, seeds: Iterator[int]) -> None:
     for seed in seeds:
         one, other = case_of(seed, form), case_of(seed + 1, form)
