@@ -113,7 +113,7 @@ def test_exact_hits_are_those_of_fractions(seeds: Iterator[int]) -> None:
         assert (hits.t == right.t).all(), seed
 
 
-# Not "fast": it may put the t of slivers of mixed scales before their boxes, and the tree decides what is found.
+# Not "fast": it may put the t of slivers before their boxes, and then the tree decides what is found.
 @pytest.mark.parametrize("form", ["watertight", "compressed", "exact", "float64"])
 def test_a_refit_there_and_back_gives_the_hits_of_new_scenes(form: str, seeds: Iterator[int]) -> None:
     for seed in seeds:
