@@ -33,7 +33,7 @@ with redirect_stderr(io.StringIO()), atheris.instrument_imports(include=["wive"]
 
 FOLDER = ROOT / "build" / "fuzz"
 # What a file of some thousand bytes may take at most: seconds, while its reader is traced, and bytes.
-SECONDS, BYTES = 10, 1 << 30
+SECONDS, BYTES = 30, 1 << 30
 START = 3  # seconds that a process takes before it begins
 WORD = re.compile(rb"[A-Za-z_#:/.]{2,40}")
 
