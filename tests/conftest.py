@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from support.scene_folder import SCENES
 
 import wive
 from wive._internal import devices
@@ -18,7 +19,6 @@ from wive._internal import devices
 # For tests of `bench`; last, so that the installed wive comes before its source folder.
 sys.path.append(str(Path(__file__).resolve().parents[1]))
 
-SCENES = Path(__file__).resolve().parents[2] / "shared" / "scenes"
 BACKENDS = wive.backends()
 
 DEVICE = pytest.StashKey[str]()

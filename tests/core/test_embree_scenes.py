@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
-from conftest import SCENES
 from support.ray_differences import LABELS, Answers, explain
+from support.scene_folder import SCENES
 
 import wive
 

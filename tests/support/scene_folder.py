@@ -1,0 +1,5 @@
+"""Where the large scenes are."""
+
+from pathlib import Path
+
+SCENES = Path(__file__).resolve().parents[3] / "shared" / "scenes"
