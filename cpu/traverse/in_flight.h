@@ -67,6 +67,8 @@ public:
     }
 
 private:
+    // The three loops are functions of their own: inlined into one, they take each other's registers.
+
     // A block some of whose triangles a ray may hit.
     struct Candidate {
         State* flight;
@@ -82,7 +84,7 @@ private:
     };
 
     // Starts the next ray that can hit anything, in the given flight; writes misses for the rays before it.
-    void start_next_ray(State& f) {
+    [[gnu::noinline]] void start_next_ray(State& f) {
         for (;; ++next_) {
             bool misses = false;
             do {
@@ -138,7 +140,7 @@ private:
 
     // Visits the nodes of a few flights, which takes no branches, then enqueues those flights, which mispredicts. Small
     // groups limit what a misprediction discards; enqueueing all flights at the end would prefetch too late.
-    [[gnu::always_inline]] void visit_nodes() {
+    [[gnu::noinline]] void visit_nodes() {
         constexpr std::ptrdiff_t group_size = 8;
         const BvhView bvh = bvh_;
         State** const last = ends_.node;
@@ -162,7 +164,7 @@ private:
     // Tests one block per flight. The rest of its leaf stays on top of the stack, so that the next block is prefetched
     // and tested a round later. First find() runs on all blocks; then solve() on the few blocks with a possible hit,
     // without a branch on whether there is one; then their flights are enqueued, whose intervals are known only now.
-    [[gnu::always_inline]] void test_leaves() {
+    [[gnu::noinline]] void test_leaves() {
         const BvhView bvh = bvh_;
         State** const last = ends_.leaf;
         QueueEnds ends = {ends_.node, leaf_queue_, ends_.done};
