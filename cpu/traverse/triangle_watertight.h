@@ -99,6 +99,9 @@ public:
     }
 
 private:
+    // Of the weights together, per product: rounding moves t by less than 2^-52 / least_weight of the triangle's depth.
+    static constexpr double least_weight = 0x1p-28;
+
     // The corners in the space in which the ray is the z axis, and the edge functions.
     template <class Corners>
     struct Sheared {
@@ -119,7 +122,8 @@ private:
 
     // Computes t, u and v in double and rounds them once. x and y are scaled by the longest component of the direction,
     // which saves the divisions. If the ray hits only the triangle with rounded corners, a weight has the wrong sign
-    // here: t, u and v are then those of the rounded triangle, so that t lies within the box (frame.h).
+    // here, or all weights together are no more than rounding of their products leaves. t, u and v are then those of
+    // the rounded triangle, whose weights are exact but for one rounding, so that t lies within the box (frame.h).
     template <class Corners>
     [[gnu::always_inline]] void intersect(const Corners& corners, unsigned hit_mask, Float4 side, float (&ts)[4],
                                           float (&us)[4], float (&vs)[4]) const {
@@ -134,9 +138,12 @@ private:
             y[k] = away(1) * forward - shear_y * z[k];
         }
         const Double4 sides = widen(side), zero = Double4::all(0.0);
+        Double4 largest = zero;
         for (int k = 0; k < 3; ++k) {
             const int i = (k + 2) % 3, j = (k + 1) % 3;
-            weight[k] = flip_sign(x[i] * y[j] - y[i] * x[j], sides) + zero;  // no -0
+            const Double4 product = x[i] * y[j];
+            weight[k] = flip_sign(product - y[i] * x[j], sides) + zero;  // no -0
+            largest = max(largest, abs(product));
         }
         const Double4 det = weight[0] + weight[1] + weight[2];
         const Double4 lowest = min(min(weight[0], weight[1]), weight[2]);
@@ -145,7 +152,7 @@ private:
         Float4::narrow(height / (det * forward)).store(ts);
         Float4::narrow(weight[1] * inverse).store(us);
         Float4::narrow(weight[2] * inverse).store(vs);
-        const unsigned inside = less_equal(zero, lowest) & ~less_equal(det, zero);
+        const unsigned inside = less_equal(zero, lowest) & ~less_equal(det, largest * Double4::all(least_weight));
         if (const unsigned rounded = hit_mask & ~inside; rounded != 0) [[unlikely]]
             intersect_rounded(corners.block, rounded, ts, us, vs);
     }

@@ -180,3 +180,21 @@ def test_a_hit_is_found_again_with_tmax_at_its_own_distance(backend: str) -> Non
     found = hits.mask
     assert found.sum() > 10_000
     assert scene.occluded(origins[found], directions[found], tmin=0.0, tmax=hits.t[found]).all()
+
+
+def test_the_hit_of_a_needle_that_double_takes_for_edge_on_is_found_again(backend: str) -> None:
+    # Seen from the ray, the needle's corners lie on one line but for what doubles round away.
+    needle = np.array(
+        [
+            [9.99999935e-39, 9.99999915587e17, 1.0],
+            [9.99999795e-39, 9.99999778148e17, 0.99999988],
+            [9.99999795e-39, 9.99999984307e17, 0.99999964],
+        ],
+        np.float32,
+    )
+    scene = wive.Scene(needle, np.array([[0, 1, 2]], np.int32), backend=backend)
+    origin = np.array([[-6.226882e7, 9.999999155872727e17, 8.910913e6]], np.float32)
+    direction = np.array([[2.0404247e12, -2.5107481e12, -2.9199276e11]], np.float32)
+    hits = scene.intersect(origin, direction)
+    assert hits.t[0] == pytest.approx(6.226882e7 / 2.0404247e12)
+    assert scene.occluded(origin, direction, tmax=hits.t).all()

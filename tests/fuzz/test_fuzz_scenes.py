@@ -58,7 +58,7 @@ def test_queries_agree_with_each_other(form: str, seeds: Iterator[int]) -> None:
         with np.errstate(over="ignore"):
             tmin, tmax = (limit.astype(hits.t.dtype) for limit in rays[2:])
         assert ((hits.t >= tmin) & (hits.t <= tmax))[hits.mask].all(), seed
-        if "exact" in form:  # elsewhere the t of a sliver may lie before its box
+        if "fast" not in form:  # which may put the t of a sliver before its box
             assert scene.occluded(*rays[:3], hits.t)[hits.mask].all(), seed
         assert (scene.count(*rays) == np.diff(scene.intersect_all(*rays).offsets)).all(), seed
         for ray in np.flatnonzero(np.diff(many.offsets) > 1):

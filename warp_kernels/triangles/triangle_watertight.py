@@ -20,6 +20,8 @@ ORIGIN = 3
 DIRECTION = 6
 SHEAR = 9
 RAY_WORDS = 11
+# Below this sum of the weights, per product, rounding decides t.
+LEAST_WEIGHT = wp.constant(wp.float64(2.0**-28))
 
 
 @wp.func
@@ -138,7 +140,10 @@ def watertight_triangles(
         wb = flip(edge_of(xc, yc, xa, ya), negative)
         wc = flip(edge_of(xa, ya, xb, yb), negative)
         det = wa + wb + wc
-        if wp.min(wp.min(wa, wb), wc) < wp.float64(0.0) or det <= wp.float64(0.0):
+        least = wp.abs(product_double(xc, yb))
+        least = wp.max(least, wp.abs(product_double(xa, yc)))
+        least = wp.max(least, wp.abs(product_double(xb, ya))) * LEAST_WEIGHT
+        if wp.min(wp.min(wa, wb), wc) < wp.float64(0.0) or det <= least:
             return solve_rounded(units, block, j, stack)
         inverse = wp.float64(1.0) / det
         za = away(units, at_a, stride, stack, 2)
