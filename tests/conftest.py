@@ -29,8 +29,12 @@ Mesh = tuple[np.ndarray, np.ndarray]
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--slow", action="store_true", help="also run the tests that take minutes")
     parser.addoption("--cases", type=int, default=40, help="cases per test of tests/fuzz; default: 40")
-    parser.addoption("--first", type=int, default=0, help="the seed of the first of them; default: 0")
-    parser.addoption("--minutes", type=float, help="run the tests of tests/fuzz for so long, with new seeds")
+    parser.addoption("--first", type=int, help="the seed of the first of them; default: 0")
+    parser.addoption(
+        "--minutes",
+        type=float,
+        help="run the tests of tests/fuzz for so long, with new seeds if no --first is given",
+    )
     parser.addoption(
         "--device",
         default=os.environ.get("WIVE_TEST_DEVICE"),

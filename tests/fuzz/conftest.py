@@ -10,17 +10,21 @@ import pytest
 
 @pytest.fixture
 def seeds(request: pytest.FixtureRequest) -> Iterator[int]:
-    """One per case: `--cases` from `--first` on, or new ones while this test's share of `--minutes` lasts."""
+    """One per case: `--cases` of them, or as many as this test's share of `--minutes` takes.
+
+    They begin at `--first`, which is 0 with `--cases` and any number with `--minutes`.
+    """
     option = request.config.getoption
+    first = option("--first")
     if option("--minutes") is None:
-        return iter(range(option("--first"), option("--first") + option("--cases")))
+        return iter(range(first or 0, (first or 0) + option("--cases")))
     tests = [item for item in request.session.items if "seeds" in getattr(item, "fixturenames", ())]
-    return new_seeds(60 * option("--minutes") / len(tests))
+    return seeds_for(60 * option("--minutes") / len(tests), secrets.randbits(48) if first is None else first)
 
 
-def new_seeds(seconds: float) -> Iterator[int]:
+def seeds_for(seconds: float, first: int) -> Iterator[int]:
     end = time.monotonic() + seconds
-    for seed in itertools.count(secrets.randbits(48)):
+    for seed in itertools.count(first):
         yield seed
         if time.monotonic() > end:
             return
