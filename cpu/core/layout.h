@@ -28,9 +28,9 @@ constexpr int high_row(int axis) { return 2 * axis + 1; }
 inline constexpr int octants = 8;
 inline constexpr int order_bits = 4;
 
-// An inner node: eight rows of eight lanes, one lane per child. Planes are relative to BvhView::center and moved outwards
-// by the slack of write_node.h. The order of octant 7 - o is the reverse of octant o's. Lanes without a child hold an inverted box that
-// nothing hits.
+// An inner node: eight rows of eight lanes, one lane per child. Planes are relative to BvhView::center and moved
+// outwards by the slack of write_node.h. The order of octant 7 - o is the reverse of octant o's. Lanes without a child
+// hold an inverted box that nothing hits.
 struct alignas(64) Node {
     float planes[plane_rows][node_width];
     std::uint32_t child[node_width];
