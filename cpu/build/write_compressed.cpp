@@ -173,30 +173,37 @@ LeafSize pack_leaf(const Mesh<float>& mesh, std::span<const std::uint32_t> prims
     return size;
 }
 
+// The node with its children's planes moved outwards once more: compressed, the distance to each of them is rounded in
+// proportion to the planes of the whole node (frame.h).
+Node with_slack(const Node& node, int children) {
+    Node wider = node;
+    float largest = 0;
+    for (const auto& row : node.planes)
+        for (int i = 0; i < children; ++i) largest = std::max(largest, std::abs(row[i]));
+    const float slack = largest * plane_slack_factor;
+    for (int axis = 0; axis < 3; ++axis)
+        for (int i = 0; i < children; ++i) {
+            wider.planes[low_row(axis)][i] -= slack;
+            wider.planes[high_row(axis)][i] += slack;
+        }
+    return wider;
+}
+
 }  // namespace
 
 void CompressedWriter::write_node(const wive::Node& node, int children, Node& out) {
-    // Distances to planes are rounded in proportion to the node's box, of which each child's takes a part (frame.h).
-    float largest = 0;
-    for (int row = 0; row < plane_rows; ++row)
-        for (int i = 0; i < children; ++i) largest = std::max(largest, std::abs(node.planes[row][i]));
-    const float slack = largest * plane_slack_factor;
+    const wive::Node wider = with_slack(node, children);
     for (int axis = 0; axis < 3; ++axis) {
-        std::array<float, node_width> low{}, high{};
-        for (std::size_t i = 0; i < static_cast<std::size_t>(children); ++i) {
-            low[i] = node.planes[low_row(axis)][i] - slack;
-            high[i] = node.planes[high_row(axis)][i] + slack;
-        }
-        const float lowest = children > 0 ? *std::min_element(low.begin(), low.begin() + children) : 0.0f;
-        const float highest = children > 0 ? *std::max_element(high.begin(), high.begin() + children) : 0.0f;
+        const float *low = wider.planes[low_row(axis)], *high = wider.planes[high_row(axis)];
+        const float lowest = children > 0 ? *std::min_element(low, low + children) : 0.0f;
+        const float highest = children > 0 ? *std::max_element(high, high + children) : 0.0f;
         const float step = least_step(lowest, highest);
         out.origin[axis] = lowest;
         out.step[axis] = step;
         for (int i = 0; i < node_width; ++i) {
             const bool used = i < children;
-            const auto lane = static_cast<std::size_t>(i);
-            const int below = used ? Distance(lowest, low[lane]).steps_below(step) : highest_byte;
-            const int above = used ? Distance(lowest, high[lane]).steps_above(step) : 0;
+            const int below = used ? Distance(lowest, low[i]).steps_below(step) : highest_byte;
+            const int above = used ? Distance(lowest, high[i]).steps_above(step) : 0;
             assert(below >= 0 && below <= highest_byte && above >= 0 && above <= highest_byte);
             out.planes[low_row(axis)][i] = static_cast<std::uint8_t>(below);
             out.planes[high_row(axis)][i] = static_cast<std::uint8_t>(above);

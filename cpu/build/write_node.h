@@ -20,8 +20,9 @@ namespace wive {
 // overflows.
 inline constexpr float empty_plane = 1e24f;
 
-// The part of the boxes' slack that is due to their planes, per largest |plane| of a box: 17u, so that at least 16u are
-// left when the difference is rounded (traverse/frame.h). A box inside another stays inside: rounding is monotonic.
+// How far a box's planes are moved outwards, per largest |plane| of that box: at least 16u are needed for the rounding
+// of distances to them (traverse/frame.h), and u for the rounding of the moved plane. Rounding is monotonic, so a box
+// inside another stays inside.
 inline constexpr float plane_slack_factor = 0x1.1p-20f;
 
 // Writes a child's box with its slack. An empty one becomes the inverted box that nothing hits.

@@ -3,12 +3,13 @@
 
 #include <algorithm>
 #include <bit>
-#include <cassert>
 #include <cstddef>
+#include <limits>
 
 #include "core/layout.h"
 #include "core/ray.h"
 #include "traverse/concepts.h"
+#include "traverse/pauses.h"
 
 namespace wive::WIVE_ISA {
 
@@ -25,7 +26,7 @@ public:
 
     // Whether ray i, before `end`, is known to miss. Rays are asked for in ascending order.
     [[gnu::always_inline]] bool has(std::size_t i, std::size_t end) {
-        if (i < next_try_) return false;
+        if (!pauses_.allow(i)) return false;
         if (i >= block_end_ && !test_block(i, end)) return false;
         return misses_ >> (i - (block_end_ - block_size)) & 1u;
     }
@@ -33,7 +34,6 @@ public:
 private:
     static constexpr unsigned block_size = 16;
     static constexpr int worthwhile_misses = 4;  // of a block
-    static constexpr std::size_t longest_pause = 2032;
 
     [[gnu::noinline]] bool test_block(std::size_t first, std::size_t end) {
         if (end - first < block_size) return false;
@@ -41,27 +41,23 @@ private:
         misses_ = 0;
         for (unsigned i = 0; i < block_size; i += 4) misses_ |= misses_of_four(first + i) << i;
         block_end_ = first + block_size;
-        if (std::popcount(misses_) >= worthwhile_misses) {
-            pause_ = 0;
-        } else {
-            pause_ = pause_ < longest_pause ? 2 * pause_ + block_size : longest_pause;
-            next_try_ = block_end_ + pause_;
-        }
+        if (std::popcount(misses_) >= worthwhile_misses)
+            pauses_.worthwhile();
+        else
+            pauses_.in_vain(block_end_);
         return true;
     }
 
-    // The box of the root's children, which has the slack of their planes.
+    // The box of the root's children, which has the slack of their planes. Without children its middle is NaN, by which
+    // no ray is known to miss.
     void find_box() {
         const auto& root = bvh_.template node<Layout>(inner_child(0));
         for (int axis = 0; axis < 3; ++axis) {
-            double low = 0, high = 0;
-            bool is_first = true;
+            double low = std::numeric_limits<double>::infinity(), high = -low;
             for (int lane = 0; lane < node_width; ++lane) {
                 if (root.child[lane] == end_of_stack) continue;
-                const double lane_low = root.plane(low_row(axis), lane), lane_high = root.plane(high_row(axis), lane);
-                low = is_first ? lane_low : std::min(low, lane_low);
-                high = is_first ? lane_high : std::max(high, lane_high);
-                is_first = false;
+                low = std::min(low, root.plane(low_row(axis), lane));
+                high = std::max(high, root.plane(high_row(axis), lane));
             }
             middle_[axis] = static_cast<float>(0.5 * (low + high));
             half_[axis] = static_cast<float>(0.5 * (high - low));
@@ -69,11 +65,12 @@ private:
         }
     }
 
-    // The mask of those of rays [first, first + 4) that miss the box. A line misses it if it is farther from its middle
-    // than the box reaches, seen along one of the axes: no division. A ray also misses if it starts outside and leads
-    // away. Relative to the tree's centre, with O the origin's and P the planes' largest coordinate, rounding and the
+    // The mask of those of rays [first, first + 4) that miss the box. Seen along an axis, the box is a rectangle and
+    // the ray a line; if all corners of the rectangle lie on one side of the line, the ray misses. This takes no
+    // division. A ray also misses if it starts outside of the box on an axis and leads away from it on that axis.
+    // Relative to the tree's centre, with O the origin's and P the planes' largest coordinate, rounding and the
     // triangle test (frame.h) add up to less than 20u (O + P); the box is enlarged by 32u (O + P). Components of the
-    // direction count as at least 2^-30 of the longest; so underflow is less than that slack if (O + P) times the
+    // direction count as at least 2^-30 of the longest, so that underflow is less than that slack if (O + P) times the
     // longest is in range.
     unsigned misses_of_four(std::size_t first) const {
         constexpr float slack_factor = 0x1p-19f, smallest_part = 0x1p-30f, least = 0x1p-90f, most = 0x1p120f;
@@ -112,7 +109,8 @@ private:
     const BvhView bvh_;
     const RayBatch<Real> rays_;
     float middle_[3], half_[3], largest_ = 0;
-    std::size_t next_try_ = 0, block_end_ = 0, pause_ = 0;
+    Pauses pauses_{block_size, block_size};
+    std::size_t block_end_ = 0;
     unsigned misses_ = 0;  // of the block before block_end_
 };
 

@@ -67,7 +67,7 @@ public:
     }
 
 private:
-    // The three loops are functions of their own: inlined into one, they take each other's registers.
+    // The three loops are functions of their own: inlined into one function they would share its registers.
 
     // A block some of whose triangles a ray may hit.
     struct Candidate {

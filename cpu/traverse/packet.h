@@ -19,6 +19,7 @@
 #include <new>
 
 #include "traverse/packet_slabs.h"
+#include "traverse/pauses.h"
 #include "traverse/traversal.h"
 
 namespace wive::WIVE_ISA {
@@ -93,8 +94,8 @@ private:
     } worthwhile_ratio = {3, 2};
 
     // The largest difference between the rays' directions, relative to their longest component, and between their
-    // origins, relative to the tree's extent; and how wide the rays may be apart at the tree's centre, relative to
-    // that.
+    // origins, relative to the tree's extent; and how far apart the rays may be at the tree's centre, relative to its
+    // extent.
     static constexpr float max_turn = 1.0f / 8, max_shift = 1.0f / 16, max_width = 3.0f / 8;
 
     // An entry of the stack of a split packet: the rays that meet the child's box, and where.
@@ -313,24 +314,22 @@ public:
     static constexpr bool bit_exact = OnePacket::bit_exact;
 
     // None if fewer rays are in flight than a packet has.
-    Packets(const BvhView& bvh, const auto& rays, const auto& hits, unsigned in_flight)
-        : next_try_(in_flight < OnePacket::packet_size ? std::numeric_limits<std::size_t>::max() : 0),
-          packet_(bvh, rays, hits) {}
+    Packets(const BvhView& bvh, const auto& rays, const auto& hits, unsigned in_flight) : packet_(bvh, rays, hits) {
+        if (in_flight < OnePacket::packet_size) pauses_.never();
+    }
 
     // Traces the rays from `next` on as a packet if there are enough and they are coherent; returns true then, with
     // `next` moved past them, or to the end if the packet was split: its rays come before all others. After a packet
     // that was refused or not worthwhile, more and more rays are skipped before the next attempt.
     [[gnu::always_inline]] bool trace_next(std::size_t& next, std::size_t end) {
-        if (next < next_try_ || end - next < OnePacket::packet_size) return false;
+        if (!pauses_.allow(next) || end - next < OnePacket::packet_size) return false;
         const auto outcome = packet_.trace(next);
         const bool traced = outcome != OnePacket::Outcome::refused;
         if (traced) next += OnePacket::packet_size;
-        if (outcome == OnePacket::Outcome::worthwhile) {
-            pause_ = 0;
-        } else {
-            next_try_ = next + pause_;
-            pause_ = pause_ < longest_pause ? 2 * pause_ + OnePacket::packet_size : longest_pause;
-        }
+        if (outcome == OnePacket::Outcome::worthwhile)
+            pauses_.worthwhile();
+        else
+            pauses_.in_vain(next);
         if (packet_.has_split_rays()) {
             after_split_ = next;
             next = end;
@@ -346,11 +345,10 @@ public:
     }
 
 private:
-    static constexpr std::size_t longest_pause = 2032;  // 16, 48, 112, 240 and so on
     // Until a packet was worthwhile: what the tries of a batch of few rays lose would be a large part of its time.
     static constexpr std::size_t first_pause = 112;
 
-    std::size_t next_try_, pause_ = first_pause;  // in rays
+    Pauses pauses_{0, first_pause};
     std::size_t after_split_ = 0;
     OnePacket packet_;
 };

@@ -99,7 +99,8 @@ public:
     }
 
 private:
-    // Of the weights together, per product: rounding moves t by less than 2^-52 / least_weight of the triangle's depth.
+    // The least sum of the weights that is trusted, relative to the largest of their products: rounding moves t by less
+    // than 2^-24 of the triangle's depth then.
     static constexpr double least_weight = 0x1p-28;
 
     // The corners in the space in which the ray is the z axis, and the edge functions.

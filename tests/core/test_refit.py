@@ -100,9 +100,8 @@ def test_a_refitted_tree_keeps_its_shape_and_holds_its_triangles_tightly(moved: 
             lanes = used[child // 64]
             lowest, highest = low[child // 64][lanes].min(axis=0), high[child // 64][lanes].max(axis=0)
         largest = np.abs([lowest - bvh.center, highest - bvh.center]).max()
-        least = (
-            16 * 2.0**-24 * largest if child >= 1 << 31 else 0.0
-        )  # the slack of a box, which its parent shares
+        # The slack of a leaf's box; a node's box shares that of its children.
+        least = 16 * 2.0**-24 * largest if child >= 1 << 31 else 0.0
         most = 18 * 2.0**-24 * largest + np.spacing(np.abs(moved).max() + 1e-30) * 2
         for looser in (lowest - low[node, lane], high[node, lane] - highest):
             assert (looser >= least).all()

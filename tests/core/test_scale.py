@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+from support.meshes import sphere
 
 import wive
-from tests.support.meshes import sphere
 
 RADIUS = 0.1
 SIZES = (2.0, 2e3, 2e4, 2e5)  # of the ground under the ball

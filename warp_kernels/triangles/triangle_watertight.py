@@ -20,7 +20,7 @@ ORIGIN = 3
 DIRECTION = 6
 SHEAR = 9
 RAY_WORDS = 11
-# Below this sum of the weights, per product, rounding decides t.
+# The least sum of the weights that is trusted, relative to the largest of their products.
 LEAST_WEIGHT = wp.constant(wp.float64(2.0**-28))
 
 
