@@ -51,7 +51,9 @@ public:
 
     // Traces rays [first, first + packet_size) and writes their hits, or refuses to if they are not coherent.
     [[gnu::noinline]] Outcome trace(std::size_t first) {
-        if (!are_coherent(first, packet_size - 1) || !are_coherent(first, 1) || !load(first)) return Outcome::refused;
+        Origins origins;
+        if (!are_coherent(first, packet_size - 1, origins) || !are_coherent(first, 1, origins) || !load(first, origins))
+            return Outcome::refused;
         first_ = first;
         entry_count_ = 0;
         split_rays_ = 0;
@@ -110,12 +112,18 @@ private:
         typename Triangles<I>::Found found;
     };
 
+    // The extremes of the rays' origins on each axis.
+    struct Origins {
+        Real4 low, high;
+    };
+
     // Compares every step-th ray. NaN and infinity are left to load().
-    bool are_coherent(std::size_t first, unsigned step) const {
+    bool are_coherent(std::size_t first, unsigned step, Origins& origins) const {
         const auto vector = [](const Real* p, std::size_t i) {
             return Real4::set(p[3 * i], p[3 * i + 1], p[3 * i + 2], 0);
         };
-        Real4 low_origin = vector(rays_.origins, first), high_origin = low_origin;
+        auto& [low_origin, high_origin] = origins;
+        low_origin = high_origin = vector(rays_.origins, first);
         Real4 low_direction = vector(rays_.directions, first), high_direction = low_direction;
         for (std::size_t i = first + step; i < first + packet_size; i += step) {
             const Real4 origin = vector(rays_.origins, i), direction = vector(rays_.directions, i);
@@ -134,31 +142,38 @@ private:
 
     // Returns false if a ray hits nothing by rule, or if the rays differ in octant or in scale, which would make the
     // bounds loose.
-    bool load(std::size_t first) {
-        Float4 low_rdir{}, high_rdir{}, low_origin{}, high_origin{};
-        bounds_.tmin = std::numeric_limits<float>::infinity();
+    bool load(std::size_t first, const Origins& origins) {
+        const Float4 infinity = Float4::all(std::numeric_limits<float>::infinity()), zero = Float4::all(0);
+        Float4 low_rdir = infinity, high_rdir = zero - infinity;
         for (unsigned i = 0; i < packet_size; ++i) {
             Frame& ray = ray_[i];
             if (!ray.load(bvh_, rays_, first + i)) return false;
             if ((ray.order_shift != ray_[0].order_shift) | (ray.unscale != ray_[0].unscale)) return false;
             assert(ray.is_finite());
             const Float4 rdir = Float4::load(ray.rdir);
-            const Float4 origin = Float4::narrow(Real4::load(ray.origin) - Real4::of(Float4::load(bvh_.center)));
-            low_rdir = i == 0 ? rdir : min(low_rdir, rdir);
-            high_rdir = i == 0 ? rdir : max(high_rdir, rdir);
-            low_origin = i == 0 ? origin : min(low_origin, origin);
-            high_origin = i == 0 ? origin : max(high_origin, origin);
-            for (unsigned axis = 0; axis < 3; ++axis) {
-                rdir_[axis][i] = ray.rdir[axis];
-                near_bias_[axis][i] = ray.near_bias[axis];
-                far_bias_[axis][i] = ray.far_bias[axis];
-            }
-            tmin_[i] = ray.interval.box_tmin();
-            tmax_[i] = ray.interval.box_tmax();
-            bounds_.tmin = tmin_[i] < bounds_.tmin ? tmin_[i] : bounds_.tmin;
+            low_rdir = min(low_rdir, rdir);
+            high_rdir = max(high_rdir, rdir);
             new (&query_[i]) Query(start_query<Query>(ray, hits_, first + i));
         }
-        set_bounds(low_rdir, high_rdir, low_origin, high_origin, Float4::load(bvh_.extent));
+        Float4 least_tmin = infinity;
+        for (unsigned i = 0; i < packet_size; i += 4) {
+            const auto four = [&](auto of_ray) {
+                return Float4::set(of_ray(ray_[i]), of_ray(ray_[i + 1]), of_ray(ray_[i + 2]), of_ray(ray_[i + 3]));
+            };
+            for (unsigned axis = 0; axis < 3; ++axis) {
+                four([&](const Frame& ray) { return ray.rdir[axis]; }).store(rdir_[axis] + i);
+                four([&](const Frame& ray) { return ray.near_bias[axis]; }).store(near_bias_[axis] + i);
+                four([&](const Frame& ray) { return ray.far_bias[axis]; }).store(far_bias_[axis] + i);
+            }
+            const Float4 tmin = four([](const Frame& ray) { return ray.interval.box_tmin(); });
+            tmin.store(tmin_ + i);
+            least_tmin = min(least_tmin, tmin);
+            four([](const Frame& ray) { return ray.interval.box_tmax(); }).store(tmax_ + i);
+        }
+        bounds_.tmin = -highest_lane(zero - least_tmin);
+        const Real4 center = Real4::of(Float4::load(bvh_.center));
+        set_bounds(low_rdir, high_rdir, Float4::narrow(origins.low - center), Float4::narrow(origins.high - center),
+                   Float4::load(bvh_.extent));
         return true;
     }
 
