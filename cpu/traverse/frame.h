@@ -167,6 +167,19 @@ struct AxisFrame : RayFrame<I> {
         axis[1] = following >> 2 * axis[0] & 3u;
         return true;
     }
+
+    // The lanes of a block whose triangle lies in a plane across an axis on which the ray's direction, `way`, is zero:
+    // the ray sees it edge-on. So do all triangles of a floor or a wall that the ray lies in, without any arithmetic.
+    template <class Corners>
+    [[gnu::always_inline]] unsigned edge_on(const Corners& corners, const auto& way) const {
+        unsigned lanes = 0;
+        for (int i = 0; i < 2; ++i) {
+            if (way[axis[i]] != 0) continue;
+            const auto first = corners.vertex(0, axis[i]);
+            lanes |= equal(first, corners.vertex(1, axis[i])) & equal(first, corners.vertex(2, axis[i]));
+        }
+        return lanes;
+    }
 };
 
 }  // namespace wive::WIVE_ISA

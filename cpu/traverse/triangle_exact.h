@@ -122,9 +122,11 @@ public:
             (aside + Double4::all(4 * e) * along) * (Double4::all(13 * e) * aside + Double4::all(21 * e) * along);
         const Double4 minus_error = Double4::all(0.0) - error;
         unsigned hit_mask = may_be_hit & (less_equal(minus_error, low) | less_equal(high, error));
+        const unsigned on_edge = less_equal(low, error) & less_equal(minus_error, high);  // or may be
+        if ((hit_mask & on_edge) != 0) [[unlikely]]
+            hit_mask &= ~ray_.edge_on(corners, ray_.caller_direction);
         if (hit_mask == 0) return false;
 
-        const unsigned on_edge = less_equal(low, error) & less_equal(minus_error, high);  // or may be
         const Double4 inverse_det = Double4::all(1.0) / (weight[0] + weight[1] + weight[2]);
         const Double4 depth = (weight[0] * z[0] + weight[1] * z[1] + weight[2] * z[2]) * inverse_det;
         const Double4 weight_error = Double4::all(6.0) * error * abs(inverse_det);

@@ -82,16 +82,21 @@ public:
     template <class Corners, OfferedQuery<Real> Query>
     [[gnu::always_inline]] bool solve(const Corners& corners, const Found& found, Query& query) const {
         if constexpr (precision_of<Real> == Precision::float64) {
+            const unsigned may_be_hit = found.hit_mask & ~ray_.edge_on(corners, ray_.direction);
+            if (may_be_hit == 0) return false;
             const Sheared<Corners> sheared(*this, corners);
             Float64Hits<I> hits;
-            const unsigned hit_mask = hits.solve(found.hit_mask, sheared.x, sheared.y, sheared.z, sheared.weight,
+            const unsigned hit_mask = hits.solve(may_be_hit, sheared.x, sheared.y, sheared.z, sheared.weight,
                                                  ray_.direction[axis_[2]], query.crossings);
             return offer_lanes(corners.block, hit_mask, hits.t, hits.u, hits.v, query);
         } else {
             unsigned hit_mask = found.hit_mask;
             Float4 side = found.side;
-            if (const unsigned zero_edges = hit_mask & found.zero_edges; zero_edges != 0) [[unlikely]]
-                hit_mask = resolve_zero_edges(corners.block, hit_mask, zero_edges, query.crossings, side);
+            if ((hit_mask & found.zero_edges) != 0) [[unlikely]] {
+                hit_mask &= ~ray_.edge_on(corners, ray_.direction);
+                hit_mask = resolve_zero_edges(corners.block, hit_mask, found.zero_edges, query.crossings, side);
+                if (hit_mask == 0) return false;
+            }
             alignas(16) float ts[4], us[4], vs[4];
             intersect(corners, hit_mask, side, ts, us, vs);
             return offer_lanes(corners.block, hit_mask, ts, us, vs, query);
@@ -158,14 +163,15 @@ private:
             intersect_rounded(corners.block, rounded, ts, us, vs);
     }
 
-    // Decides the lanes with an edge function of zero by exact signs; returns the hit mask and corrects `side`.
+    // Decides the lanes of the mask with an edge function of zero by exact signs; returns the hit mask and corrects
+    // `side`.
     template <class Block>
     [[gnu::noinline]] unsigned resolve_zero_edges(const Block& block, unsigned hit_mask, unsigned zero_edges,
                                                   bool crossings, Float4& side) const {
         alignas(16) float sides[4];
         side.store(sides);
-        for (; zero_edges != 0; zero_edges &= zero_edges - 1) {
-            const int lane = __builtin_ctz(zero_edges);
+        for (unsigned rest = hit_mask & zero_edges; rest != 0; rest &= rest - 1) {
+            const int lane = __builtin_ctz(rest);
             const RoundedTriangle rounded = round_corners(block, lane);
             const int passed = side_passed(rounded.x, rounded.y, rounded.edge, crossings);
             if (passed == 0) hit_mask &= ~(1u << lane);

@@ -35,6 +35,17 @@ def small_integers() -> HardSet:
     return HardSet(few_bits(random, 40, 3), faces, few_bits(random, 1200, 5), few_bits(random, 1200, 3))
 
 
+def wide_integers(bits: int) -> HardSet:
+    """Small integers, some of them times 2^bits; every ray meets a vertex exactly."""
+    random = np.random.default_rng(34)
+    scale = np.ldexp(1.0, bits * random.integers(2, size=(40, 3))).astype(np.float32)
+    vertices = few_bits(random, 40, 7) * scale
+    met = random.integers(40, size=1200)
+    directions = few_bits(random, 1200, 3) * scale[met]
+    origins = vertices[met] - directions * random.integers(1, 3, (1200, 1)).astype(np.float32)
+    return HardSet(vertices, random.integers(40, size=(60, 3)).astype(np.int32), origins, directions)
+
+
 def axis_rays_on_a_grid() -> HardSet:
     """A closed box of integer cells; rays along the axes at every half cell, its border included."""
     vertices, faces = grid(4)
@@ -147,6 +158,8 @@ def mixed_exponents() -> HardSet:
 
 SETS = {
     "small integers": small_integers,
+    "the widest for 128 bits": lambda: wide_integers(12),
+    "too wide for 128 bits": lambda: wide_integers(18),
     "axis rays on a grid": axis_rays_on_a_grid,
     "slivers": slivers,
     "coincident faces": coincident_faces,

@@ -100,8 +100,11 @@ _SOLVE = (
 """
     + _SETUP
     + """
-    const ExactIntersection exact(from, way, corners, ExactIntersection::unit_of(from, corners));
     hit[3] = 0.0f;
+    // In a plane across an axis on which the direction is zero: edge-on, as in a floor that the ray lies in.
+    for (int i = 0; i < 3; ++i)
+        if (way[i] == 0.0f && corners[i] == corners[3 + i] && corners[i] == corners[6 + i]) return hit;
+    const ExactIntersection exact(from, way, corners, ExactIntersection::unit_of(from, corners));
     if (!(crossings ? exact.hit_perturbed : exact.hit)) return hit;
     const float t = exact.t();
     // -0 is that of a hit behind the origin.
@@ -121,6 +124,7 @@ _COMPARE = (
     float others[9];
     for (int i = 0; i < 9; ++i) others[i] = ((const float*)units)[other[i / 3] + other_stride * (i % 3)];
     const int unit = ExactIntersection::unit_of(from, others, ExactIntersection::unit_of(from, corners));
+    if (ExactIntersection::are_same(corners, others)) return 0;
     return ExactIntersection(from, way, corners, unit).compare(ExactIntersection(from, way, others, unit));
 """
 )
