@@ -1,5 +1,6 @@
 """Arrays of other libraries in host memory: read if they can be, else refused in one line with the reason."""
 
+import enum
 import sys
 import types
 
@@ -24,6 +25,19 @@ class Exporting:
 
     def __dlpack_device__(self):
         return (1, 0)
+
+
+class Named(Exporting):
+    """One whose device type is a member of an enum that is no integer, as Open3D's."""
+
+    def __dlpack_device__(self):
+        return Device.CPU, 0
+
+
+class Device(enum.Enum):
+    """The only member of Open3D's that matters here."""
+
+    CPU = 1
 
 
 class ReadOnly(Exporting):
@@ -63,6 +77,7 @@ class Broken(Foreign.Array):
 KINDS = {
     "DLPack and back": Foreign.Array,
     "DLPack, one way": Exporting,
+    "device type by name": Named,
     "read-only": ReadOnly,
     "__array__": Arrayish,
 }

@@ -170,6 +170,7 @@ class DLPackArrays(_OnWarpStream):
     def device(self, array: Any) -> str | None:
         """The device that the protocol names."""
         kind, index = array.__dlpack_device__()
+        kind = getattr(kind, "value", kind)  # Open3D's is an enum of its own
         if kind in DLPACK_CPU:
             return "cpu"
         return f"cuda:{index}" if kind in DLPACK_CUDA else f"DLPack device {int(kind)}"
