@@ -3,19 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, Literal, TypeVar, overload
+from typing import TYPE_CHECKING, Any, TypeVar, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from wive import _cpu
 from wive._internal import arguments
-from wive._internal.arguments import USUAL_WORK, LanesOption, Work
+from wive._internal.arguments import (
+    USUAL_WORK,
+    AccuracyOption,
+    LanesOption,
+    NodesOption,
+    QualityOption,
+    Work,
+)
 from wive._internal.cpu_tracer import CpuTracer
 from wive._internal.files import PathLike, file_name
 from wive._internal.host_arrays import host_array
 from wive._internal.lines import one_line
-from wive._internal.precision import FLOAT64, Floats, Precision, real_of
+from wive._internal.mesh_objects import MeshObject, mesh_arrays
+from wive._internal.precision import Floats, Precision, real_of
 from wive._internal.rays import Rays, check_rays
 from wive._internal.storage import FORMAT_VERSION, Options, read_scene, refuse_newer, write_scene
 from wive._internal.tracer import Tracer
@@ -42,23 +50,26 @@ class Scene:
 
     def __init__(
         self,
-        vertices: ArrayLike,
-        faces: ArrayLike,
+        vertices: ArrayLike | MeshObject,
+        faces: ArrayLike | None = None,
         *,
+        dtype: DTypeLike | None = None,
         backend: str = "auto",
         device: str | None = None,
-        accuracy: Literal["fast", "watertight", "exact"] = "watertight",
-        nodes: Literal["float32", "compressed"] = "float32",
-        quality: Literal["medium", "high"] = "medium",
+        accuracy: AccuracyOption = "watertight",
+        nodes: NodesOption = "float32",
+        quality: QualityOption = "medium",
     ) -> None:
         """Build the tree.
 
         Arguments:
-            vertices: (v,3) real numbers. Their dtype decides the scene's precision: an array of float64 makes
-                a float64 scene, whose vertices, rays, t and uv are float64, for coordinates such as surveys';
-                all else, lists included, makes a float32 scene. Vertices that no face uses may be NaN.
+            vertices: (v,3) real numbers; or, without faces, a mesh object: of trimesh, PyVista or Open3D, or
+                any that has vertices and faces, which are copied. Vertices that no face uses may be NaN.
             faces: (f,3) integers, three vertices per triangle, counter-clockwise as seen from the side that
                 its normal points to. Zero-area triangles keep their number and are never hit.
+            dtype: np.float32 or np.float64, the scene's precision: that of vertices, rays, t and uv. If it is
+                None, an array of float64 makes a float64 scene, for coordinates such as surveys', and all
+                else, lists included, a float32 scene. Meshes of trimesh and Open3D hold float64.
             backend: "auto" (the fastest CPU backend this machine has) or a name in `wive.backends()`.
             device: the device of backend "warp", by Warp's names: "cpu", "cuda:0", ...; None is the first
                 CUDA device, else "cpu". A device alone implies backend "warp"; CPU backends take none.
@@ -81,7 +92,11 @@ class Scene:
             backend=backend, device=device, accuracy=accuracy, nodes=nodes, quality=quality
         )
         found, place = resolve_backend(backend, device)
-        mesh = arguments.mesh(host_array("vertices", vertices), host_array("faces", faces), accuracy)
+        rounding = ""
+        if faces is None:
+            rounding, (vertices, faces) = "dtype=np.float32", mesh_arrays(vertices)
+        given = host_array("vertices", vertices), host_array("faces", faces)
+        mesh = arguments.mesh(*given, accuracy, dtype, rounding)
         points, self._faces = map(arguments.read_only, mesh)
         self._real = real_of(points.dtype, accuracy)
         bvh = _cpu.Bvh(points, self._faces, accuracy, nodes=nodes, quality=quality)
@@ -365,8 +380,8 @@ class Scene:
 
     def __repr__(self) -> str:
         """Size and options."""
-        shown = f"{len(self)} triangles, backend={self.backend!r}, accuracy={self.accuracy!r}"
-        return f"Scene({shown}, precision='float64')" if self._real is FLOAT64 else f"Scene({shown})"
+        options = f"backend={self.backend!r}, accuracy={self.accuracy!r}, precision={self.precision!r}"
+        return f"Scene({len(self)} triangles, {options})"
 
     def __reduce__(self) -> tuple[Callable[..., Scene], tuple[Any, ...]]:
         """Pickle the mesh and the options; unpickling builds the tree again."""

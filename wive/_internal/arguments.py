@@ -8,9 +8,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Literal, NamedTuple, TypedDict, TypeGuard
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike, DTypeLike, NDArray
 
-from wive._internal.precision import FLOAT32, Floats, Real, real_of
+from wive._internal.precision import FLOAT32, Floats, Real, real_asked, real_of
 from wive._internal.room import expect_room
 from wive._internal.scalars import MOST_COUNT, shown, unreadable
 from wive._internal.scalars import choice as choice
@@ -20,6 +20,9 @@ from wive._internal.scalars import real as real
 
 Given = ArrayLike  # what users pass, by a name short enough for overloads
 Int32 = NDArray[np.int32]
+AccuracyOption = Literal["fast", "watertight", "exact"]
+NodesOption = Literal["float32", "compressed"]
+QualityOption = Literal["medium", "high"]
 Lanes = Literal[1, 8]
 LanesOption = Literal["auto", 8, 1]
 
@@ -119,8 +122,18 @@ def bounds(value: ArrayLike, largest: float) -> NDArray[np.float64]:
     return corners
 
 
-def mesh(vertices: ArrayLike, faces: ArrayLike, accuracy: str = "watertight") -> tuple[Floats, Int32]:
-    """Vertices (v,3) float32 or float64 and faces (f,3) int32, C-contiguous; such arrays are not copied."""
+def mesh(
+    vertices: ArrayLike,
+    faces: ArrayLike,
+    accuracy: str = "watertight",
+    dtype: DTypeLike | None = None,
+    rounding: str = "",
+) -> tuple[Floats, Int32]:
+    """Vertices (v,3) float32 or float64 and faces (f,3) int32, C-contiguous; such arrays are not copied.
+
+    If `dtype` is None, that of the vertices decides. `rounding` is what errors name as the way to round.
+    """
+    asked = None if dtype is None else real_asked(dtype, accuracy)
     points = _positions(vertices)
     corners = _numeric("faces", faces, "an (f, 3) array of integers", "iu", "round them to integer indices")
     if corners.shape == (0,):
@@ -138,9 +151,12 @@ def mesh(vertices: ArrayLike, faces: ArrayLike, accuracy: str = "watertight") ->
         raise ValueError(
             f"faces must index the {len(points)} vertices from 0, got {corners[face].tolist()} in face {face}"
         )
-    # Lists have no dtype: NumPy's choice would depend on whether a number in them has a decimal point.
-    given = np.dtype(np.float32) if isinstance(vertices, list | tuple) else points.dtype
-    points = real_of(given, accuracy).taken("vertices", vertices, points)
+    if asked is None:
+        # Lists have no dtype: NumPy's choice would depend on whether a number in them has a decimal point.
+        given = np.dtype(np.float32) if isinstance(vertices, list | tuple) else points.dtype
+        points = real_of(given, accuracy).taken("vertices", vertices, points, rounding)
+    else:
+        points = asked.array(points)
     return points, np.require(corners, np.int32, ["C", "A"])
 
 

@@ -36,14 +36,14 @@ class Real:
         with _cpu.DefaultFloats(), np.errstate(over="ignore", invalid="ignore"):
             return np.require(values, self.dtype, ["C", "A"])
 
-    def taken(self, name: str, given: ArrayLike, values: NDArray[Any]) -> Floats:
+    def taken(self, name: str, given: ArrayLike, values: NDArray[Any], rounding: str = "") -> Floats:
         """What `array` returns for `values`, the array made of the argument `name`, whose value is `given`.
 
-        Raises ValueError if that rounds a number and this precision may not.
+        Raises ValueError if that rounds a number and this precision may not; `rounding` is how users may.
         """
         rounded = self.array(values)
         if not self.rounds and values.dtype != self.dtype:
-            refuse_rounded(name, given, values, rounded)
+            refuse_rounded(name, given, values, rounded, rounding)
         return rounded
 
     def __reduce__(self) -> tuple[Any, tuple[str, bool]]:
@@ -82,7 +82,17 @@ def real_named(name: DTypeLike) -> Real:
     raise ValueError(f"dtype must be float32 or float64, got {name!r:.60}")
 
 
-def refuse_rounded(name: str, given: ArrayLike, values: NDArray[Any], rounded: Floats) -> None:
+def real_asked(name: DTypeLike, accuracy: str) -> Real:
+    """The precision that a user asks for; ValueError if there is none, or not with this accuracy."""
+    real = real_named(name)
+    if real is FLOAT64 and accuracy == "exact":
+        raise ValueError("dtype must be float32 for accuracy 'exact', got float64: leave one of them out")
+    return real
+
+
+def refuse_rounded(
+    name: str, given: ArrayLike, values: NDArray[Any], rounded: Floats, rounding: str = ""
+) -> None:
     """Raise ValueError if a number that the user gave differs from the one it was rounded to.
 
     NaN is kept: vertices that no face uses may be NaN.
@@ -100,8 +110,8 @@ def refuse_rounded(name: str, given: ArrayLike, values: NDArray[Any], rounded: F
         place, number = (
             (name, given) if values.ndim == 0 else (f"{name}[{row}]", np.asarray(exact[row]).tolist())
         )
-        rounding = f"{name}.astype(np.float32)" if values is exact else f"np.asarray({name}, np.float32)"
+        in_place = f"{name}.astype(np.float32)" if values is exact else f"np.asarray({name}, np.float32)"
         raise ValueError(
             f"{name} must be float32 numbers for accuracy 'exact', got {place} = {number!s:.90}: "
-            f"round them with {rounding}, or use accuracy 'watertight'"
+            f"round them with {rounding or in_place}, or use accuracy 'watertight'"
         )

@@ -1,11 +1,12 @@
 """A scene as one file: its mesh and its options. Loading builds the tree again, bit for bit the same."""
 
 import io
-from typing import Any, Literal, TypedDict
+from typing import Any, TypedDict
 
 import numpy as np
 from numpy.typing import NDArray
 
+from wive._internal.arguments import AccuracyOption, NodesOption, QualityOption
 from wive._internal.files import PathLike, atomic_write, file_name
 from wive._internal.lines import one_line
 from wive._internal.npzfile import Npz, open_npz
@@ -21,9 +22,9 @@ class Options(TypedDict):
 
     backend: str
     device: str | None
-    accuracy: Literal["fast", "watertight", "exact"]
-    nodes: Literal["float32", "compressed"]
-    quality: Literal["medium", "high"]
+    accuracy: AccuracyOption
+    nodes: NodesOption
+    quality: QualityOption
 
 
 # What else a file or a pickle may hold is a newer wive's.
