@@ -1,23 +1,31 @@
-"""Ray queries for trimesh: a drop-in for `trimesh.ray.ray_pyembree.RayMeshIntersector`.
+"""Ray queries for trimesh: for all meshes at once, or for one, by the methods of trimesh's own intersectors.
 
->>> mesh.ray = wive.trimesh.RayMeshIntersector(mesh)
+>>> wive.trimesh.install()  # every mesh of trimesh now uses wive
 >>> mesh.contains(points)
+>>> mesh.ray.intersects_location(origins, directions)
 
-This module does not import trimesh: it uses the mesh that it is given.
+Only `install` and `installed` import trimesh.
 """
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any, TypedDict
 
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from wive._internal import arguments
+from wive._internal.arguments import AccuracyOption, NodesOption, QualityOption
 from wive._internal.inside import contains, counts_by_place
+from wive._internal.mesh_rays import MeshRays, rays_of, set_rays
 from wive._internal.placed_mesh import Float64, Found, Int64, PlacedMesh
-from wive._internal.precision import FLOAT64, Floats, real_named
+from wive._internal.precision import FLOAT64, Floats, real_asked
 from wive.scene import Scene
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
 
 LEAST_SQUARED = 1e-280  # shorter vectors lose digits when they are squared
 
@@ -39,7 +47,9 @@ class RayMeshIntersector:
         *,
         backend: str = "auto",
         device: str | None = None,
-        accuracy: Literal["fast", "watertight", "exact"] = "watertight",
+        accuracy: AccuracyOption = "watertight",
+        nodes: NodesOption = "float32",
+        quality: QualityOption = "medium",
         threads: int | None = None,
         dtype: DTypeLike = np.float32,
     ) -> None:
@@ -48,7 +58,7 @@ class RayMeshIntersector:
         Arguments:
             geometry: the `trimesh.Trimesh`.
             scale_to_box: scale the mesh, by a power of two, to a size of about one.
-            backend, device, accuracy: as for `wive.Scene`.
+            backend, device, accuracy, nodes, quality: as for `wive.Scene`.
             threads: how many each query uses; None is every core. For CPU backends.
             dtype: of the scene's numbers: np.float32, or np.float64 if detail is finer than 1e-7 of the
                 mesh's size, but not with accuracy "exact".
@@ -68,12 +78,12 @@ class RayMeshIntersector:
                 f"geometry must be a trimesh.Trimesh, got {type(geometry).__name__} without "
                 f"{', '.join(missing)}: make one with trimesh.load(path, force='mesh')"
             )
-        self._real = real_named(dtype)
-        if self._real is FLOAT64 and accuracy == "exact":
-            raise ValueError("dtype must be float32 for accuracy 'exact', got float64: leave one of them out")
+        self._real = real_asked(dtype, accuracy)
         self.mesh = geometry
         self._scale_to_box = scale_to_box
-        self._options: dict[str, Any] = {"backend": backend, "device": device, "accuracy": accuracy}
+        self._options: dict[str, Any] = {
+            "backend": backend, "device": device, "accuracy": accuracy, "nodes": nodes, "quality": quality
+        }  # fmt: skip
         self._threads = threads
         self._placed: tuple[int, PlacedMesh] | None = None
 
@@ -193,6 +203,77 @@ class RayMeshIntersector:
     def __deepcopy__(self, memo: dict[int, Any]) -> RayMeshIntersector:
         """Another intersector on the same mesh, as trimesh's own do."""
         return self.__copy__()
+
+
+class IntersectorOptions(TypedDict, total=False):
+    """The options of `RayMeshIntersector`; see there."""
+
+    scale_to_box: bool
+    backend: str
+    device: str | None
+    accuracy: AccuracyOption
+    nodes: NodesOption
+    quality: QualityOption
+    threads: int | None
+    dtype: DTypeLike
+
+
+def install(**options: Unpack[IntersectorOptions]) -> None:
+    """Use wive for the rays and the `contains` of every trimesh mesh in this process.
+
+    Also of meshes that exist already, and of every mesh to come: copies, submeshes, sums, primitives, loaded
+    and unpickled ones. Whether embreex is installed makes no difference. `mesh.ray` is then a
+    `RayMeshIntersector` with these options, made when it is first used. An intersector that is assigned to
+    `mesh.ray` afterwards is used instead, and so are those of other classes that were assigned before.
+    Installing again replaces the options.
+
+    Raises ImportError if trimesh is not installed, and what `RayMeshIntersector` and its queries raise for a
+    bad option; nothing changes then.
+    """
+    kind = _mesh_class()
+    current = rays_of(kind)
+    if current is None or current.options != options:
+        probe = RayMeshIntersector(_NoMesh(), **options).scene
+        arguments.threads(options.get("threads"))
+        arguments.refuse_lacking(probe.backend, probe._tracer.lacks, {"threads": options.get("threads")})
+        set_rays(kind, MeshRays(RayMeshIntersector, {**options}))
+
+
+def uninstall() -> None:
+    """Give every mesh the intersector back that trimesh made for it; nothing if wive is not installed."""
+    set_rays(_mesh_class(), None)
+
+
+@contextmanager
+def installed(**options: Unpack[IntersectorOptions]) -> Iterator[None]:
+    """A block in which wive is installed; when it ends, what was installed before it is again.
+
+    >>> with wive.trimesh.installed(dtype=np.float64):
+    ...     inside = mesh.contains(points)
+
+    Blocks may be nested. Raises what `install` raises.
+    """
+    kind = _mesh_class()
+    before = rays_of(kind)
+    install(**options)
+    try:
+        yield
+    finally:
+        set_rays(kind, before)
+
+
+class _NoMesh:
+    """A mesh without triangles, for trying options."""
+
+    vertices, faces, bounds = np.zeros((0, 3)), np.zeros((0, 3), np.int32), None
+
+
+def _mesh_class() -> Any:
+    try:
+        from trimesh import Trimesh
+    except ImportError as error:
+        raise ImportError(f"wive.trimesh needs trimesh ({error}): pip install trimesh") from error
+    return Trimesh
 
 
 def _rays(ray_origins: ArrayLike, ray_directions: ArrayLike) -> tuple[Float64, Float64]:

@@ -1,4 +1,4 @@
-"""The programs in README.md and docs/warp.md run as they are printed."""
+"""The programs in README.md, docs/libraries.md and docs/warp.md run as they are printed."""
 
 import re
 import subprocess
@@ -33,6 +33,13 @@ def test_the_readmes_program_runs(tmp_path: Path) -> None:
     printed = run(program, tmp_path).strip()
     assert printed == "[ 1.  1. inf] [1 1 0]"
     assert program.endswith(f"# {printed}\n")
+
+
+@pytest.mark.parametrize("program", programs("docs/libraries.md"))
+def test_the_libraries_pages_programs_print_what_they_say(program: str, tmp_path: Path) -> None:
+    pytest.importorskip("trimesh")
+    said = re.findall(r"print\(.*?\)  # ([^:\n]*)", program)
+    assert run(program, tmp_path).splitlines() == said
 
 
 @pytest.mark.parametrize("number", range(len(programs("docs/warp.md"))))

@@ -1,0 +1,75 @@
+"""`mesh.ray` of all trimesh meshes by wive: a property of their class, which changes no mesh."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+# Of a mesh: what trimesh or the user set as its intersector, and the one that is used in its place.
+OWN, HELD = "ray", "_wive_ray"
+
+
+class Held:
+    """The intersector of one mesh, and the property that it is used for.
+
+    Copies and pickles hold None instead: what is pickled can be read without wive.
+    """
+
+    def __init__(self, mesh: object, by: MeshRays, ray: Any) -> None:
+        """Keep all three: a copied `__dict__` is another mesh's."""
+        self.mesh, self.by, self.ray = mesh, by, ray
+
+    def __reduce__(self) -> tuple[type[None], tuple[()]]:
+        """As None."""
+        return type(None), ()
+
+
+class MeshRays:
+    """The attribute `ray` of a mesh class: an intersector, made when first read, in place of trimesh's own.
+
+    Those that users assign to it are used instead, and those of other classes that they assigned before.
+    """
+
+    def __init__(self, make: Callable[..., Any], options: dict[str, Any]) -> None:
+        """Intersectors are `make(mesh, **options)`."""
+        self.make, self.options = make, options
+
+    def __get__(self, mesh: object, owner: type | None = None) -> Any:
+        """The mesh's intersector; of a class, this property."""
+        if mesh is None:
+            return self
+        attributes = vars(mesh)
+        if OWN not in attributes:  # its constructor has not come so far
+            raise AttributeError(f"{type(mesh).__name__!r} object has no attribute {OWN!r}")
+        own = attributes[OWN]
+        if not type(own).__module__.startswith("trimesh."):
+            return own
+        held = attributes.get(HELD)
+        if held is None or held.by is not self or held.mesh is not mesh:
+            held = attributes[HELD] = Held(mesh, self, self.make(mesh, **self.options))
+        return held.ray
+
+    def __set__(self, mesh: object, ray: Any) -> None:
+        """Keep the intersector as the mesh's own, and use it, unless trimesh sets the first one."""
+        attributes = vars(mesh)
+        attributes[HELD] = Held(mesh, self, ray) if OWN in attributes else None
+        attributes[OWN] = ray
+
+    def __delete__(self, mesh: object) -> None:
+        """Remove the mesh's own intersector."""
+        vars(mesh).pop(HELD, None)
+        del vars(mesh)[OWN]
+
+
+def rays_of(kind: type) -> MeshRays | None:
+    """The property that a mesh class has now, if any."""
+    found = vars(kind).get(OWN)
+    return found if isinstance(found, MeshRays) else None
+
+
+def set_rays(kind: Any, rays: MeshRays | None) -> None:
+    """Give a mesh class this property, or none."""
+    if rays is not None:
+        kind.ray = rays
+    elif rays_of(kind) is not None:
+        del kind.ray
