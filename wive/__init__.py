@@ -17,7 +17,7 @@ except ImportError as error:
         "install with `pip install .` and don't import wive from inside its source folder"
     ) from error
 
-from wive import trimesh
+from wive import embreex, trimesh
 from wive.all_hits import AllHits
 from wive.backend import Backend, backends
 from wive.camera import Camera
@@ -36,6 +36,7 @@ __all__ = [
     "Scene",
     "Stats",
     "backends",
+    "embreex",
     "load",
     "load_mesh",
     "render",

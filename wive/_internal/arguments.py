@@ -160,6 +160,22 @@ def mesh(
     return points, np.require(corners, np.int32, ["C", "A"])
 
 
+def indices(name: str, value: ArrayLike, count: int, columns: tuple[int, ...]) -> Int32:
+    """Rows (f,k) int32 of indices of `count` vertices, k one of `columns`."""
+    shapes = " or ".join(f"(f, {number})" for number in columns)
+    rows = _numeric(name, value, f"an {shapes} array of integers", "iu", "round them to integer indices")
+    if rows.ndim != 2 or rows.shape[1] not in columns:
+        raise ValueError(f"{name} must have shape {shapes}, got {rows.shape}")
+    _expect_addressable(name, rows)
+    wrong = ((rows < 0) | (rows >= count)).any(axis=1)
+    if wrong.any():
+        row = int(np.argmax(wrong))
+        raise ValueError(
+            f"{name} must index the {count} vertices from 0, got {rows[row].tolist()} in row {row}"
+        )
+    return rows.astype(np.int32)
+
+
 def moved_vertices(vertices: ArrayLike, count: int, real: Real) -> Floats:
     """New positions (count,3) in the scene's dtype, C-contiguous; not copied if they are so already."""
     points = _positions(vertices)

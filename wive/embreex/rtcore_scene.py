@@ -1,0 +1,170 @@
+"""The scene of embreex, and its only query."""
+
+from __future__ import annotations
+
+from typing import Any, Literal, overload
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from wive._internal import arguments
+from wive._internal.arguments import AccuracyOption
+from wive._internal.precision import FLOAT32, Floats
+from wive.embreex.rtcore import EmbreeDevice
+from wive.hits import Hits
+from wive.scene import Scene
+
+QUERIES = "INTERSECT", "OCCLUDED", "DISTANCE"
+# The end of a ray for which none is given, embreex's own.
+FAR = 1e37
+# Embree's fast test excludes t = 0, its robust test does not.
+ABOVE_ZERO = float(np.finfo(np.float32).tiny)
+
+
+class EmbreeScene:
+    """Triangle meshes, numbered from 0 in the order they are added, that answer ray queries.
+
+    Meshes are added by `TriangleMesh` and `ElementMesh`, also after a query. Their tree is built by the next
+    query.
+
+    Attributes:
+        is_committed: 1 if the tree is that of all meshes, 0 if the next query builds it.
+    """
+
+    def __init__(self, device: EmbreeDevice | None = None, robust: bool = True) -> None:
+        """An empty scene.
+
+        Arguments:
+            device: for embreex's sake; nothing depends on it.
+            robust: accuracy "watertight" of `wive.Scene`, else "fast".
+        """
+        if not isinstance(device, EmbreeDevice | None):
+            raise TypeError(f"device must be an EmbreeDevice or None, got {type(device).__name__}")
+        self.is_committed = 0
+        self._tmin = 0.0 if robust else ABOVE_ZERO
+        self._accuracy: AccuracyOption = "watertight" if robust else "fast"
+        self._scene = Scene(np.zeros((0, 3), np.float32), np.zeros((0, 3), np.int32))
+        self._added: list[tuple[Floats, NDArray[np.int32]]] = []  # since the tree was built
+        self._starts = np.zeros(1, np.int64)  # the first triangle of each mesh, and the number of all
+
+    @property
+    def scene(self) -> Scene:
+        """The `wive.Scene` over all meshes added so far, one after another."""
+        if not self.is_committed:
+            parts, faces, count = [self._scene.vertices], [self._scene.faces], len(self._scene.vertices)
+            for vertices, triangles in self._added:
+                parts.append(vertices)
+                faces.append(triangles + np.int32(count))
+                count += len(vertices)
+            self._scene = Scene(np.concatenate(parts), np.concatenate(faces), accuracy=self._accuracy)
+            self._added = []
+            self.is_committed = 1
+        return self._scene
+
+    def add(self, vertices: Floats, triangles: NDArray[np.int32]) -> int:
+        """Add a mesh of vertices (v,3) float32 and triangles (f,3) int32, both kept; returns its number."""
+        self._added.append((vertices, triangles))
+        self._starts = np.append(self._starts, self._starts[-1] + len(triangles))
+        self.is_committed = 0
+        return len(self._starts) - 2
+
+    @overload
+    def run(
+        self,
+        vec_origins: ArrayLike,
+        vec_directions: ArrayLike,
+        dists: ArrayLike | None = None,
+        query: str = "INTERSECT",
+        output: Literal[None, False, 0] = None,
+    ) -> NDArray[Any]: ...
+    @overload
+    def run(
+        self,
+        vec_origins: ArrayLike,
+        vec_directions: ArrayLike,
+        dists: ArrayLike | None = None,
+        query: str = "INTERSECT",
+        *,
+        output: Literal[True, 1],
+    ) -> dict[str, NDArray[Any]]: ...
+    def run(
+        self,
+        vec_origins: ArrayLike,
+        vec_directions: ArrayLike,
+        dists: ArrayLike | None = None,
+        query: str = "INTERSECT",
+        output: object = None,
+    ) -> NDArray[Any] | dict[str, NDArray[Any]]:
+        """Trace n rays on all cores.
+
+        Arguments:
+            vec_origins: (n,3) real numbers, taken as float32.
+            vec_directions: (n,3), or (1,3) if all rays share it, of any length.
+            dists: where rays end, in multiples of the direction's length: a number, or (n,) one per ray; None
+                is 1e37. Never written to.
+            query: "INTERSECT", "DISTANCE" or "OCCLUDED".
+            output: return a dictionary; not with "OCCLUDED".
+
+        Returns by query, for the closest hit of each ray:
+            INTERSECT: (n,) int32, the triangle's number in its mesh, -1 on a miss.
+            DISTANCE: (n,) float32, the distance in multiples of the direction's length, `dists` on a miss.
+            OCCLUDED: (n,) int32, 0 if the ray hits anything, else -1.
+        With `output`, by name:
+            primID, geomID: (n,) int32, the triangle's number in its mesh and the mesh's; -1 on a miss.
+            tfar: (n,) float32, as of DISTANCE.
+            u, v: (n,) float32, the point hit is (1-u-v) v0 + u v1 + v v2; 0 on a miss.
+            Ng: (n,3) float32, the normal (v1-v0) x (v2-v0), not of unit length; 0 on a miss.
+
+        Raises ValueError or TypeError, in one line naming the argument.
+        """
+        arguments.choice("query", query, QUERIES)
+        if output and query == "OCCLUDED":
+            raise ValueError(
+                "output is for queries INTERSECT and DISTANCE, got it with OCCLUDED: leave it out"
+            )
+        origins = arguments.vectors("vec_origins", vec_origins, FLOAT32, may_be_one=False)
+        directions = arguments.vectors("vec_directions", vec_directions, FLOAT32, may_be_one=False)
+        count = len(origins)
+        if len(directions) not in (1, count):
+            raise ValueError(
+                f"vec_directions must have shape ({count}, 3), one per origin, or (1, 3), "
+                f"got {directions.shape}"
+            )
+        if len(directions) == 1:
+            directions = directions[0]
+        ends = arguments.limits("dists", FAR if dists is None else dists, count)
+        if ends.size == 1:
+            ends = np.broadcast_to(ends, (count,))
+        scene, starts = self.scene, self._starts
+        if query == "OCCLUDED":
+            return scene.occluded(origins, directions, self._tmin, ends).astype(np.int32) - np.int32(1)
+        hits = scene.intersect(origins, directions, self._tmin, ends)
+        if query == "DISTANCE" and not output:
+            return _ends(hits, ends)
+        geom = np.searchsorted(starts[1:], hits.prim, side="right")
+        prim = np.where(hits.mask, hits.prim - starts[geom], -1).astype(np.int32)
+        if not output:
+            return prim
+        geom = np.where(hits.mask, geom, -1).astype(np.int32)
+        u, v = np.where(hits.mask, hits.uv.T, np.float32(0))
+        return {
+            "u": u,
+            "v": v,
+            "Ng": _normals(hits),
+            "tfar": _ends(hits, ends),
+            "primID": prim,
+            "geomID": geom,
+        }
+
+
+def _ends(hits: Hits, ends: Floats) -> Floats:
+    """(n,) float32: t, or on a miss where the ray ends."""
+    return np.where(hits.mask, hits.t, ends)
+
+
+def _normals(hits: Hits) -> Floats:
+    """(n,3) float32 normals of the triangles hit, twice their area long, from float64; 0 on a miss."""
+    normals = np.zeros((len(hits.prim), 3), np.float32)
+    corners = hits.vertices.astype(np.float64)[hits.faces[hits.prim[hits.mask]]]
+    normals[hits.mask] = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    return normals
