@@ -59,7 +59,7 @@ MESHES = {
     "sum": lambda: ball() + ball().apply_translation([5, 0, 0]),
     "concatenation": lambda: trimesh.util.concatenate([ball(), ball().apply_translation([5, 0, 0])]),
     "subdivided": lambda: ball().subdivide(),
-    "of a scene": lambda: trimesh.Scene([ball()]).to_mesh(),
+    "of a scene": lambda: trimesh.util.concatenate(trimesh.Scene([ball()]).dump()),
     "in a scene": lambda: next(iter(trimesh.Scene([ball()]).geometry.values())),
     "loaded from STL": lambda: loaded("stl"),
     "loaded from PLY": lambda: loaded("ply"),

@@ -72,6 +72,7 @@ PAIRS = ("vertices", "faces"), ("points", "faces"), ("vertices", "triangles")
 # What makes one triangle mesh of an object that is none, by a method that such objects have.
 MENDS = {
     "to_mesh": "to_mesh()",  # trimesh.Scene
+    "dump": "dump(concatenate=True)",  # trimesh.Scene of older versions
     "extract_surface": "extract_surface().triangulate()",  # PyVista's grids and blocks
 }
 
