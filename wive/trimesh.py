@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike, DTypeLike, NDArray
 from wive._internal import arguments
 from wive._internal.arguments import AccuracyOption, NodesOption, QualityOption
 from wive._internal.inside import contains, counts_by_place
-from wive._internal.mesh_rays import MeshRays, rays_of, set_rays
+from wive._internal.mesh_rays import MeshRays, mesh_class, rays_of, set_rays
 from wive._internal.placed_mesh import Float64, Found, Int64, PlacedMesh
 from wive._internal.precision import FLOAT64, Floats, real_asked
 from wive.scene import Scene
@@ -223,14 +223,17 @@ def install(**options: Unpack[IntersectorOptions]) -> None:
 
     Also of meshes that exist already, and of every mesh to come: copies, submeshes, sums, primitives, loaded
     and unpickled ones. Whether embreex is installed makes no difference. `mesh.ray` is then a
-    `RayMeshIntersector` with these options, made when it is first used. An intersector that is assigned to
-    `mesh.ray` afterwards is used instead, and so are those of other classes that were assigned before.
-    Installing again replaces the options.
+    `RayMeshIntersector`, made when it is first read. An intersector that is assigned to `mesh.ray` afterwards
+    is used instead, and so are those of other classes that were assigned before.
+
+    Arguments:
+        options: those of `RayMeshIntersector`: backend, device, accuracy, nodes, quality, threads, dtype and
+            scale_to_box. Installing again replaces all of them.
 
     Raises ImportError if trimesh is not installed, and what `RayMeshIntersector` and its queries raise for a
     bad option; nothing changes then.
     """
-    kind = _mesh_class()
+    kind = mesh_class()
     current = rays_of(kind)
     if current is None or current.options != options:
         probe = RayMeshIntersector(_NoMesh(), **options).scene
@@ -241,7 +244,7 @@ def install(**options: Unpack[IntersectorOptions]) -> None:
 
 def uninstall() -> None:
     """Give every mesh the intersector back that trimesh made for it; nothing if wive is not installed."""
-    set_rays(_mesh_class(), None)
+    set_rays(mesh_class(), None)
 
 
 @contextmanager
@@ -253,7 +256,7 @@ def installed(**options: Unpack[IntersectorOptions]) -> Iterator[None]:
 
     Blocks may be nested. Raises what `install` raises.
     """
-    kind = _mesh_class()
+    kind = mesh_class()
     before = rays_of(kind)
     install(**options)
     try:
@@ -266,14 +269,6 @@ class _NoMesh:
     """A mesh without triangles, for trying options."""
 
     vertices, faces, bounds = np.zeros((0, 3)), np.zeros((0, 3), np.int32), None
-
-
-def _mesh_class() -> Any:
-    try:
-        from trimesh import Trimesh
-    except ImportError as error:
-        raise ImportError(f"wive.trimesh needs trimesh ({error}): pip install trimesh") from error
-    return Trimesh
 
 
 def _rays(ray_origins: ArrayLike, ray_directions: ArrayLike) -> tuple[Float64, Float64]:

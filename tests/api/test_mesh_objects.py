@@ -45,6 +45,13 @@ def tensors(vertices, faces):
     return SimpleNamespace(vertex={"positions": vertices}, triangle={"indices": faces})
 
 
+class Tensor:
+    """A tensor that only its own method converts."""
+
+    def __init__(self, values):
+        self.numpy = lambda: values
+
+
 def shapes(vertices, faces):
     return {
         "vertices, faces": Coordinates(vertices, faces),
@@ -52,6 +59,10 @@ def shapes(vertices, faces):
         "points, faces": Polygons(vertices, faces),
         "vertices, triangles": Triangles(vertices, faces),
         "tensors": tensors(vertices, faces),
+        "tensors as attributes": SimpleNamespace(
+            vertex=SimpleNamespace(positions=Tensor(vertices)),
+            triangle=SimpleNamespace(indices=Tensor(faces)),
+        ),
         "scene": wive.Scene(vertices, faces),
     }
 
@@ -160,7 +171,8 @@ POINTS = np.zeros((4, 3))
         ("mesh.ply", TypeError, r"got 'mesh\.ply' alone: wive\.Scene\.from_file reads files"),
         (POINTS, TypeError, "faces must be given with vertices, got an array alone"),
         ([[0, 0, 0]], TypeError, "faces must be given with vertices, got an array alone"),
-        ((VERTICES, FACES), TypeError, "faces must be given with vertices, got an array alone"),
+        ((VERTICES, FACES), TypeError, r"got a tuple of both: wive\.Scene\(\*mesh\)"),
+        (SimpleNamespace(vertex=3, triangle=3), TypeError, "got no positions"),
         (None, TypeError, "the mesh must have vertices and faces, got NoneType"),
         (SimpleNamespace(to_mesh=0), TypeError, r"take wive\.Scene\(mesh\.to_mesh\(\)\)"),
         (SimpleNamespace(extract_surface=0), TypeError, r"\.extract_surface\(\)\.triangulate\("),

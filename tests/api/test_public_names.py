@@ -22,10 +22,15 @@ def functions() -> dict[str, object]:
         if inspect.ismodule(member):
             continue
         found[name] = member
+    for module, names in {
+        "trimesh": ("RayMeshIntersector", "install", "installed", "uninstall"),
+        "embreex": ("EmbreeDevice", "EmbreeScene", "ElementMesh", "TriangleMesh"),
+    }.items():
+        found |= {f"{module}.{name}": getattr(getattr(wive, module), name) for name in names}
+    for name, member in list(found.items()):
         if inspect.isclass(member):
             methods = inspect.getmembers(member, inspect.isroutine)
             found |= {f"{name}.{key}": method for key, method in methods if not key.startswith("_")}
-    found["trimesh.RayMeshIntersector"] = wive.trimesh.RayMeshIntersector
     return found
 
 

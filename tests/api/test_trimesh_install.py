@@ -168,6 +168,11 @@ def test_blocks_may_be_nested_and_restore_what_was_before_them():
             raise KeyError
         assert mesh.ray.scene.accuracy == "fast"
     assert mesh.ray is own
+    with installed(accuracy="fast"):
+        assert mesh.ray is not outer  # other options were used since
+        again = mesh.ray
+    with installed(accuracy="fast"):
+        assert mesh.ray is again  # the tree is kept
     install(quality="high")
     with installed():
         pass

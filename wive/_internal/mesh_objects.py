@@ -94,6 +94,8 @@ def mesh_arrays(mesh: Any) -> tuple[Any, Any]:
 
 def _copied(name: str, value: Any) -> Any:
     """A copy of any library's array; what is no array comes back as it is, to be refused by name."""
+    if library_of(value) is NUMPY and hasattr(value, "numpy"):  # a tensor without DLPack
+        value = value.numpy()
     array = host_array(name, value)
     if isinstance(array, (list, tuple)):  # lists have no dtype
         return array
@@ -120,11 +122,13 @@ def _unpadded(mesh: Any, cells: Any) -> Any:
 
 
 def _in_tensors(tensors: Any, name: str) -> Any:
-    """A copy of the tensor of this name."""
+    """A copy of the tensor of this name, an item or an attribute."""
     try:
         tensor = tensors[name]
-    except KeyError:
-        raise TypeError(f"the mesh must have vertex positions and triangle indices, got no {name}") from None
+    except (KeyError, TypeError):
+        tensor = getattr(tensors, name, None)
+    if tensor is None:
+        raise TypeError(f"the mesh must have vertex positions and triangle indices, got no {name}")
     return _copied(name, tensor)
 
 
@@ -138,6 +142,8 @@ def _no_mesh(mesh: Any) -> str:
     """Why an object is no mesh."""
     if isinstance(mesh, (str, bytes, os.PathLike)):
         return f"faces must be given with vertices, got {shown(mesh)} alone: wive.Scene.from_file reads files"
+    if isinstance(mesh, tuple) and len(mesh) == 2:
+        return "faces must be given with vertices, got a tuple of both: wive.Scene(*mesh)"
     if isinstance(mesh, (np.ndarray, list, tuple)) or library_of(mesh) is not NUMPY:
         return "faces must be given with vertices, got an array alone: wive.Scene(vertices, faces)"
     for method, mend in MENDS.items():

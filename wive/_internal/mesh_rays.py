@@ -10,14 +10,14 @@ OWN, HELD = "ray", "_wive_ray"
 
 
 class Held:
-    """The intersector of one mesh, and the property that it is used for.
+    """The intersector of one mesh, and the options that it is used for.
 
     Copies and pickles hold None instead: what is pickled can be read without wive.
     """
 
-    def __init__(self, mesh: object, by: MeshRays, ray: Any) -> None:
+    def __init__(self, mesh: object, options: dict[str, Any], ray: Any) -> None:
         """Keep all three: a copied `__dict__` is another mesh's."""
-        self.mesh, self.by, self.ray = mesh, by, ray
+        self.mesh, self.options, self.ray = mesh, options, ray
 
     def __reduce__(self) -> tuple[type[None], tuple[()]]:
         """As None."""
@@ -45,20 +45,29 @@ class MeshRays:
         if not type(own).__module__.startswith("trimesh."):
             return own
         held = attributes.get(HELD)
-        if held is None or held.by is not self or held.mesh is not mesh:
-            held = attributes[HELD] = Held(mesh, self, self.make(mesh, **self.options))
+        if held is None or held.options != self.options or held.mesh is not mesh:
+            held = attributes[HELD] = Held(mesh, self.options, self.make(mesh, **self.options))
         return held.ray
 
     def __set__(self, mesh: object, ray: Any) -> None:
         """Keep the intersector as the mesh's own, and use it, unless trimesh sets the first one."""
         attributes = vars(mesh)
-        attributes[HELD] = Held(mesh, self, ray) if OWN in attributes else None
+        attributes[HELD] = Held(mesh, self.options, ray) if OWN in attributes else None
         attributes[OWN] = ray
 
     def __delete__(self, mesh: object) -> None:
         """Remove the mesh's own intersector."""
         vars(mesh).pop(HELD, None)
         del vars(mesh)[OWN]
+
+
+def mesh_class() -> Any:
+    """`trimesh.Trimesh`; ImportError if trimesh can't be imported."""
+    try:
+        from trimesh import Trimesh
+    except ImportError as error:
+        raise ImportError(f"wive.trimesh needs trimesh ({error}): pip install trimesh") from error
+    return Trimesh
 
 
 def rays_of(kind: type) -> MeshRays | None:
