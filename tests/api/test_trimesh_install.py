@@ -270,6 +270,9 @@ def test_an_intersector_that_a_user_assigns_is_used():
     uninstall()
     assert before.ray is chosen
     assert after.ray is theirs
+    after.ray = trimesh.ray.ray_triangle.RayMeshIntersector(after)  # as trimesh makes them
+    install()
+    assert type(after.ray) is RayMeshIntersector
 
 
 def test_changes_of_a_mesh_are_followed():

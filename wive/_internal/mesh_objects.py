@@ -5,6 +5,7 @@ They are known by their attributes; no library is imported.
 
 from __future__ import annotations
 
+import operator
 import os
 from typing import Any, Protocol
 
@@ -123,13 +124,13 @@ def _unpadded(mesh: Any, cells: Any) -> Any:
 
 def _in_tensors(tensors: Any, name: str) -> Any:
     """A copy of the tensor of this name, an item or an attribute."""
-    try:
-        tensor = tensors[name]
-    except (KeyError, TypeError):
-        tensor = getattr(tensors, name, None)
-    if tensor is None:
-        raise TypeError(f"the mesh must have vertex positions and triangle indices, got no {name}")
-    return _copied(name, tensor)
+    for read in operator.getitem, getattr:
+        try:
+            tensor = read(tensors, name)
+        except (AttributeError, KeyError, TypeError):
+            continue
+        return _copied(name, tensor)
+    raise TypeError(f"the mesh must have vertex positions and triangle indices, got no {name}")
 
 
 def _kind(mesh: object) -> str:

@@ -10,14 +10,18 @@ OWN, HELD = "ray", "_wive_ray"
 
 
 class Held:
-    """The intersector of one mesh, and the options that it is used for.
+    """The intersector of one mesh, and for what it is used: the options, in place of which intersector.
 
     Copies and pickles hold None instead: what is pickled can be read without wive.
     """
 
-    def __init__(self, mesh: object, options: dict[str, Any], ray: Any) -> None:
-        """Keep all three: a copied `__dict__` is another mesh's."""
-        self.mesh, self.options, self.ray = mesh, options, ray
+    def __init__(self, mesh: object, own: Any, options: dict[str, Any], ray: Any) -> None:
+        """Keep all four: a copied `__dict__` is another mesh's."""
+        self.mesh, self.own, self.options, self.ray = mesh, own, options, ray
+
+    def is_for(self, mesh: object, own: Any, options: dict[str, Any]) -> bool:
+        """Whether it may be used."""
+        return self.mesh is mesh and self.own is own and self.options == options
 
     def __reduce__(self) -> tuple[type[None], tuple[()]]:
         """As None."""
@@ -45,14 +49,14 @@ class MeshRays:
         if not type(own).__module__.startswith("trimesh."):
             return own
         held = attributes.get(HELD)
-        if held is None or held.options != self.options or held.mesh is not mesh:
-            held = attributes[HELD] = Held(mesh, self.options, self.make(mesh, **self.options))
+        if held is None or not held.is_for(mesh, own, self.options):
+            held = attributes[HELD] = Held(mesh, own, self.options, self.make(mesh, **self.options))
         return held.ray
 
     def __set__(self, mesh: object, ray: Any) -> None:
         """Keep the intersector as the mesh's own, and use it, unless trimesh sets the first one."""
         attributes = vars(mesh)
-        attributes[HELD] = Held(mesh, self.options, ray) if OWN in attributes else None
+        attributes[HELD] = Held(mesh, ray, self.options, ray) if OWN in attributes else None
         attributes[OWN] = ray
 
     def __delete__(self, mesh: object) -> None:
