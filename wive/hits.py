@@ -48,7 +48,7 @@ def surface_normals(
 
 
 class Hits(ReadOnly):
-    """The closest hit of each of n rays.
+    """The closest hit of each of n rays; if these have another leading shape, (n,) below is that shape.
 
     Arrays are NumPy's if the rays were, else of the library and on the device that the rays came in;
     `vertices` and `faces` are always NumPy's.

@@ -25,6 +25,7 @@ from wive._internal.lines import one_line
 from wive._internal.mesh_objects import MeshObject, mesh_arrays
 from wive._internal.precision import Floats, Precision, real_of
 from wive._internal.rays import Rays, check_rays
+from wive._internal.shaped import query_shaped
 from wive._internal.storage import FORMAT_VERSION, Options, read_scene, refuse_newer, write_scene
 from wive._internal.tracer import Tracer
 from wive.all_hits import AllHits
@@ -141,12 +142,15 @@ class Scene:
         """The closest hit of each ray with tmin <= t <= tmax.
 
         Arguments:
-            origins, directions: (n,3) real numbers; one of shape (3,) is shared by all rays. C-contiguous
-                arrays of the scene's dtype are not copied, others are converted once. Directions may have any
-                length. Warp, torch and DLPack arrays give hits in arrays of their library, on their device,
-                without passing through the host; for a Warp scene they must lie on its device and have its
-                dtype. No call waits for the GPU then: with Warp's memory pools, CUDA graphs can capture it.
-            tmin, tmax: a number, or (n,) one per ray, in multiples of the direction's length.
+            origins, directions: (n,3) real numbers, or of any other leading shape, such as the (h,w,3) of a
+                picture, which the hits then have in place of (n,); one of shape (3,) is shared by all rays.
+                C-contiguous arrays of the scene's dtype are not copied, others are converted once. Directions
+                may have any length. Warp, torch and DLPack arrays give hits in arrays of their library, on
+                their device, without passing through the host; for a Warp scene they must lie on its device
+                and have its dtype. No call waits for the GPU then: with Warp's memory pools, CUDA graphs can
+                capture it.
+            tmin, tmax: a number, or one per ray, (n,) or of the rays' leading shape, in multiples of the
+                direction's length.
             threads: how many to use; None is every core. For CPU backends.
             in_flight: rays interleaved per thread; None leaves it to wive, 1 is plain single-ray traversal.
                 For CPU backends.
@@ -186,7 +190,10 @@ class Scene:
         lanes: LanesOption = "auto",
         stats: bool = False,
     ) -> NDArray[np.bool_] | tuple[NDArray[np.bool_], Stats]:
-        """(n,) bool: whether each ray hits anything with tmin <= t <= tmax; arguments as for `intersect`."""
+        """(n,) bool: whether each ray hits anything with tmin <= t <= tmax; arguments as for `intersect`.
+
+        Of the rays' leading shape if that is another, as all that queries return for each ray.
+        """
         return self._query(
             self._tracer.occluded, (origins, directions, tmin, tmax), threads, in_flight, lanes, stats
         )
@@ -234,7 +241,8 @@ class Scene:
             touching: every triangle that the ray touches instead, all of those at an edge or a vertex, so
                 that the first is what `intersect` returns. Accuracy "fast" does this always.
 
-        Each ray's hits are sorted by ascending t, at equal t by ascending prim.
+        Each ray's hits are sorted by ascending t, at equal t by ascending prim. Rays of a leading shape such
+        as (h,w) are numbered in C order: ray (i,j) is i * w + j.
 
         CPU backends trace once; a hit takes 24 bytes until all are found, then 16 (in float64 40, then 28).
         Warp traces twice, to count and to fill, and waits for the device in between: CUDA graphs can't
@@ -411,7 +419,7 @@ class Scene:
         else:
             options = threads, in_flight, lanes, stats, touching, max_bytes
             work = arguments.work(tracer.backend, tracer.lacks, *options)
-        answer, counters = query(checked, work)
+        answer, counters = query(checked, work) if checked.is_flat else query_shaped(query, checked, work)
         return answer if counters is None else (answer, counters)
 
 

@@ -200,7 +200,8 @@ def test_a_scene_saved_elsewhere_needs_its_backend_here_unless_it_was_auto(monke
             (ORIGINS, ORIGINS[None]),
             {},
             ValueError,
-            "directions must have shape (n, 3), or (3,) if all rays share it, got (1, 4, 3)",
+            "origins and directions must have one shape, or one of them (3,) if all rays share it, "
+            "got (4, 3) and (1, 4, 3)",
         ),
         (
             (ORIGINS, ORIGINS[0, 0]),

@@ -311,6 +311,12 @@ def limits(name: str, value: ArrayLike, count: int, real: Real = FLOAT32) -> Flo
     return _missing_if_masked(value, array, real).reshape(-1)
 
 
+def array_of_numbers(name: str, value: ArrayLike) -> NDArray[Any]:
+    """`value` as an array of real numbers of any shape; a masked one if some are masked."""
+    array, mask = _numeric(name, value, "an array of real numbers", "fiu", masked=True), _mask(value)
+    return array if mask is None else np.ma.MaskedArray(array, mask)
+
+
 def _is_ready(value: ArrayLike, dtype: np.dtype[Any]) -> TypeGuard[Floats]:
     """Whether `value` is an (n,3) array as the core takes it; quick, as checks are most of a small query."""
     return (

@@ -19,13 +19,17 @@ from wive._internal.arrays import (
 )
 from wive._internal.host_arrays import place_of, to_numpy
 from wive._internal.precision import FLOAT32, Floats, Real
+from wive._internal.shapes import has_many_axes
 
 NAMES = ("origins", "directions", "tmin", "tmax")
 Libraries = tuple[Library, Library, Library, Library]
 
 
 class Rays(NamedTuple):
-    """What a query was given, unconverted, the library of its answer, and the library of each array."""
+    """What a query was given, unconverted, the library of its answer, and the library of each array.
+
+    `is_flat` unless there are more axes than (n,3): `ray_shapes.flat_rays` makes these flat.
+    """
 
     origins: Any
     directions: Any
@@ -33,6 +37,7 @@ class Rays(NamedTuple):
     tmax: Any
     library: Library
     libraries: Libraries
+    is_flat: bool = True
 
     def numpy(self, real: Real = FLOAT32) -> tuple[Floats, Floats, Floats, Floats]:
         """Origins, directions, tmin and tmax as the core takes them; memory is shared if it can be."""
@@ -74,13 +79,17 @@ def check_rays(
         and isinstance(tmin, NUMPY_TYPES)
         and isinstance(tmax, NUMPY_TYPES)
     ):
-        return _of_numpy((origins, directions, tmin, tmax, NUMPY, ALL_NUMPY))
+        if type(origins) is np.ndarray and type(directions) is np.ndarray:
+            is_flat = origins.ndim < 3 > directions.ndim
+        else:
+            is_flat = not (has_many_axes(origins, NUMPY) or has_many_axes(directions, NUMPY))
+        return _of_numpy((origins, directions, tmin, tmax, NUMPY, ALL_NUMPY, is_flat))
     values = origins, directions, tmin, tmax
     libraries = library_of(origins), library_of(directions), library_of(tmin), library_of(tmax)
     given = list(zip(NAMES, values, libraries, strict=True))
     foreign = [one for one in given if one[2] is not NUMPY]
     if not foreign:
-        return Rays(*values, NUMPY, ALL_NUMPY)
+        return Rays(*values, NUMPY, ALL_NUMPY, _are_flat(values, ALL_NUMPY))
     first, _, library = foreign[0]
     for name, value, other in given:
         if other.name != library.name and not (other is NUMPY and _is_shared(value)):
@@ -90,7 +99,11 @@ def check_rays(
             )
     for name, value, other in foreign:
         _check_place(name, place_of(name, other, value), backend, device)
-    return Rays(*values, _answering(libraries, library), libraries)
+    return Rays(*values, _answering(libraries, library), libraries, _are_flat(values, libraries))
+
+
+def _are_flat(values: tuple[Any, ...], libraries: Libraries) -> bool:
+    return not any(map(has_many_axes, values[:2], libraries[:2]))
 
 
 def _is_shared(value: Any) -> bool:

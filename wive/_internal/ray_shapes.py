@@ -1,0 +1,73 @@
+"""Rays of any leading shape, such as those of a picture, (h,w,3): queries trace them as (n,3)."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from wive._internal import arguments
+from wive._internal.arrays import NUMPY, Library
+from wive._internal.rays import NAMES, Rays
+from wive._internal.room import expect_room
+from wive._internal.shapes import Shape, reshaped, shape_of
+
+# The axes at the end of origins, directions, tmin and tmax that hold one ray's numbers.
+OF_ONE_RAY: tuple[Shape, ...] = ((3,), (3,), (), ())
+
+
+def flat_rays(rays: Rays) -> tuple[Rays, Shape]:
+    """The same rays as (n,3) and (n,), and the leading shape that they were given in.
+
+    Raises ValueError unless origins and directions have one shape, or one of them is (3,), and limits are
+    numbers or of that leading shape.
+    """
+    given = list(zip(NAMES, rays[:4], rays.libraries, strict=True))
+    arrays = [_array(*one) for one in given]
+    shapes = [shape_of(name, array, library) for (name, _, library), array in zip(given, arrays, strict=True)]
+    for name, shape in zip(NAMES[:2], shapes[:2], strict=True):
+        if shape[-1:] != (3,):
+            raise ValueError(f"{name} must have shape (..., 3), one vector per ray, got {shape}")
+    one, other = shapes[:2]
+    if one != other and (3,) not in (one, other):
+        raise ValueError(
+            "origins and directions must have one shape, or one of them (3,) if all rays share it, "
+            f"got {one} and {other}"
+        )
+    leading = max(one, other, key=len)[:-1]
+    for name, shape in zip(NAMES[2:], shapes[2:], strict=True):
+        if shape not in ((), leading):
+            raise ValueError(
+                f"{name} must be one number or have shape {leading}, one per ray, got shape {shape}"
+            )
+    origins, directions, tmin, tmax = (
+        _flattened(array, library, shape, tail)
+        for array, library, shape, tail in zip(arrays, rays.libraries, shapes, OF_ONE_RAY, strict=True)
+    )
+    return Rays(origins, directions, tmin, tmax, rays.library, rays.libraries), leading
+
+
+def flat_directions(value: Any, library: Library, leading: Shape) -> Any:
+    """Directions (*leading, 3) as (n,3); (3,) stays. Raises ValueError for any other shape."""
+    array = _array("directions", value, library)
+    shape = shape_of("directions", array, library)
+    if shape not in ((3,), (*leading, 3)):
+        raise ValueError(f"directions must have shape {(*leading, 3)}, one per hit, or (3,), got {shape}")
+    return _flattened(array, library, shape, (3,))
+
+
+def _array(name: str, value: Any, library: Library) -> Any:
+    """The array; lists and the like as NumPy's."""
+    if library is not NUMPY or isinstance(value, np.ndarray | float | int | np.generic):
+        return value
+    return arguments.array_of_numbers(name, value)
+
+
+def _flattened(array: Any, library: Library, shape: Shape, tail: Shape) -> Any:
+    """The array with one axis in place of the leading ones; what all rays share stays."""
+    if shape == tail:
+        return array
+    if library is NUMPY and not array.flags.c_contiguous:
+        expect_room(array.size, array.dtype)
+    return reshaped(array, library, (math.prod(shape[: len(shape) - len(tail)]), *tail))
