@@ -25,6 +25,7 @@ from wive.hits import Hits, Stats
 from wive.meshfile import load_mesh
 from wive.rendering import render
 from wive.scene import Scene, load
+from wive.sensors import EquirectangularCamera, OrthographicCamera, PinholeCamera, SpinningLidar
 
 __version__ = "0.1.0"
 
@@ -32,8 +33,12 @@ __all__ = [
     "AllHits",
     "Backend",
     "Camera",
+    "EquirectangularCamera",
     "Hits",
+    "OrthographicCamera",
+    "PinholeCamera",
     "Scene",
+    "SpinningLidar",
     "Stats",
     "backends",
     "embreex",

@@ -6,10 +6,12 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from wive._internal import arguments
-from wive._internal.scalars import shown
+from wive._internal.picture_rays import perspective, size_of
+from wive._internal.precision import Floats
+from wive._internal.scalars import MOST_COUNT, shown
 
 # A mesh is flat, with up along its thinnest axis, if it is this much thinner on that axis than on the others.
 FLATNESS = 0.4
@@ -91,28 +93,51 @@ class Camera:
         They go from the eye to the picture's centre, from there to the middle of the right edge, and to the
         middle of the top edge.
         """
-        width, height = arguments.integer("width", width, 1), arguments.integer("height", height, 1)
+        return self._frame(*size_of(width, height, MOST_COUNT)).astype(np.float32)
+
+    def rays(self, width: int, height: int, dtype: DTypeLike = np.float64) -> tuple[Floats, Floats]:
+        """Origins and directions (h,w,3) of the rays through a picture's pixel centres, top row first.
+
+        Directions have length 1 along the view, so that the t of a hit is its depth along the camera's axis.
+        `wive.render` takes its rays from the same pixels.
+
+        Arguments:
+            width, height: of the picture, in pixels.
+            dtype: np.float64, or np.float32 for rays that a float32 scene takes without a copy.
+
+        Raises ValueError or TypeError that names a bad argument.
+
+        >>> hits = scene.intersect(*camera.rays(640, 480))
+        >>> depth = hits.t   # (480,640), inf on a miss
+        """
+        width, height = size_of(width, height)
+        return perspective(self._frame(width, height), width, height, dtype)
+
+    def _frame(self, width: int, height: int) -> NDArray[np.float64]:
         forward, right, top = self._axes()
         tangent = math.tan(math.radians(self.fov) / 2)
         eye = arguments.vector("eye", self.eye)
-        return np.stack([eye, forward, right * tangent * width / height, top * tangent]).astype(np.float32)
+        return np.stack([eye, forward, right * tangent * width / height, top * tangent])
 
     def _axes(self) -> NDArray[np.float64]:
-        """(3,3) unit vectors: forward, right, top."""
         _field_of_view(self.fov)
-        ends = arguments.vector("eye", self.eye), arguments.vector("target", self.target)
-        for name, end in zip(("eye", "target"), ends, strict=True):
-            if np.max(abs(end)) > LARGEST:
-                raise ValueError(f"{name} must be at most {LARGEST:.3g} in magnitude, got {end.tolist()}")
-        eye, target = ends
-        if (eye == target).all():
-            raise ValueError(f"eye and target must differ, got {shown(self.eye)} for both")
-        forward = _unit(target - eye)
-        right = np.cross(forward, _direction("up", self.up))
-        if np.linalg.norm(right) <= SMALLEST_ANGLE:
-            raise ValueError(f"up must not be zero or along the view, got {shown(self.up)}")
-        right /= np.linalg.norm(right)
-        return np.stack([forward, right, np.cross(right, forward)])
+        return view_axes(self.eye, self.target, self.up)
+
+
+def view_axes(eye: ArrayLike, target: ArrayLike, up: ArrayLike) -> NDArray[np.float64]:
+    """(3,3) unit vectors of a view: forward, right, top."""
+    ends = arguments.vector("eye", eye), arguments.vector("target", target)
+    for name, end in zip(("eye", "target"), ends, strict=True):
+        if np.max(abs(end)) > LARGEST:
+            raise ValueError(f"{name} must be at most {LARGEST:.3g} in magnitude, got {end.tolist()}")
+    if (ends[0] == ends[1]).all():
+        raise ValueError(f"eye and target must differ, got {shown(eye)} for both")
+    forward = _unit(ends[1] - ends[0])
+    right = np.cross(forward, _direction("up", up))
+    if np.linalg.norm(right) <= SMALLEST_ANGLE:
+        raise ValueError(f"up must not be zero or along the view, got {shown(up)}")
+    right /= np.linalg.norm(right)
+    return np.stack([forward, right, np.cross(right, forward)])
 
 
 def _field_of_view(fov: float) -> float:

@@ -15,6 +15,7 @@ from wive._internal.picture import Image, Settings
 from wive._internal.progress import progress_bar
 from wive.camera import Camera
 from wive.scene import Scene
+from wive.sensors import PinholeCamera
 
 # Paths per band: some tenths of a second, so that the bar moves; Ctrl-C takes effect between bands.
 BAND_PATHS = 300_000
@@ -23,7 +24,7 @@ CUDA_BAND_PATHS = 1 << 20
 
 def render(
     scene: Scene,
-    camera: Camera | None = None,
+    camera: Camera | PinholeCamera | None = None,
     *,
     width: int = 1280,
     height: int = 720,
@@ -57,14 +58,15 @@ def render(
 
 
 def render_counted(
-    scene: Scene, camera: Camera | None, settings: Settings, *, progress: bool
+    scene: Scene, camera: Camera | PinholeCamera | None, settings: Settings, *, progress: bool
 ) -> tuple[Image, int]:
     """The picture that `render` returns, and how many rays were traced for it."""
     if not isinstance(scene, Scene):
         raise TypeError(f"scene must be a wive.Scene, got {type(scene).__name__}")
-    if not (camera is None or isinstance(camera, Camera)):
+    if not (camera is None or isinstance(camera, Camera | PinholeCamera)):
         raise TypeError(
-            f"camera must be a wive.Camera, or None to frame the scene, got {type(camera).__name__}"
+            "camera must be a wive.Camera or wive.PinholeCamera, or None to frame the scene, "
+            f"got {type(camera).__name__}"
         )
     if scene.precision != "float32":
         raise ValueError(
