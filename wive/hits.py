@@ -13,9 +13,11 @@ from wive._internal.arrays import Library
 from wive._internal.distant import Moved
 from wive._internal.error_bounds import t_error_bounds
 from wive._internal.host_arrays import host_array
+from wive._internal.interpolation import interpolated
 from wive._internal.precision import FLOAT64, Floats, real_of
 from wive._internal.rays import Rays
 from wive._internal.read_only import ReadOnly
+from wive._internal.sides import cosines_of, meets_front
 from wive._internal.spawn import spawn_origins
 from wive._internal.wrapping import Wrapping, from_home
 
@@ -154,6 +156,46 @@ class Hits(ReadOnly):
         rows = arguments.directions(given, len(self), real_of(self.vertices.dtype, self._accuracy))
         return spawn_origins(self.vertices, self.faces, self.prim, self.uv, rows, self._accuracy)
 
+    @property
+    def front(self) -> NDArray[np.bool_]:
+        """(n,) bool, whether the ray meets the side that the triangle's normal points to; False on a miss.
+
+        Exact: the sign of normal . direction is that of real arithmetic on the scene's numbers. A ray that
+        runs in the triangle's plane meets no front. Computed at each call, from the arrays that held the
+        rays. Raises ValueError if no scene returned these hits.
+        """
+        return meets_front(self.vertices, self.faces, self.prim, self._directions("front"))
+
+    def cosines(self) -> NDArray[np.float64]:
+        """(n,) float64 |normal . direction| / |direction|, from 0 to 1 whichever side is hit; NaN on a miss.
+
+        1 is a ray that meets the triangle at a right angle, as for the intensity of a lidar's return. The
+        normal is that of `normals`. Computed at each call, from the arrays that held the rays. Raises
+        ValueError if no scene returned these hits.
+        """
+        return cosines_of(self.normals(), self._directions("cosines"))
+
+    def interpolate(self, vertex_values: ArrayLike) -> Floats:
+        """Values given at the vertices, at the points hit: (1-u-v) a + u b + v c; NaN on a miss.
+
+        Arguments:
+            vertex_values: (v,) or (v,k) real numbers, one row per vertex of the scene: colours, temperatures,
+                smooth normals. A masked number counts as NaN.
+
+        Returns (n,) or (n,k), computed in float64: float32 if the values are float16 or float32, else
+        float64. On a Warp device the values are float32 or float64, or NumPy's, which are copied there.
+        Raises ValueError or TypeError that names the argument.
+
+        >>> smooth = hits.interpolate(vertex_normals)
+        """
+        values = arguments.vertex_values(host_array("vertex_values", vertex_values), len(self.vertices))
+        return interpolated(values, self.faces, self.prim, self.uv)
+
+    def _directions(self, wanted: str) -> Floats:
+        if self._rays is None:
+            raise ValueError(f"{wanted} needs hits that a scene returned: these were made without rays")
+        return self._rays.numpy(real_of(self.vertices.dtype, self._accuracy))[1]
+
     def __len__(self) -> int:
         """Number of rays."""
         return len(self.t)
@@ -179,6 +221,9 @@ class WrappedHits(Hits):
     points = from_home(Hits.points)
     normals = from_home(Hits.normals)
     error_bound = from_home(Hits.error_bound)
+    front = from_home(Hits.front)
+    cosines = from_home(Hits.cosines)
+    interpolate = from_home(Hits.interpolate)
     spawn = from_home(Hits.spawn)
 
     def __len__(self) -> int:

@@ -112,7 +112,8 @@ def plain(values, dtype=float):
             {"device": "cpu"},
             lambda: (wp.array(ROWS[None], dtype=wp.vec3, device="cpu"), vec3()),
             ValueError,
-            "origins must have shape (n, 3), or (3,) if all rays share it, got (1, 4, 3)",
+            "origins and directions must have one shape, or one of them (3,) if all rays share it, "
+            "got (1, 4, 3) and (4, 3)",
         ),
         (
             {"device": "cpu"},

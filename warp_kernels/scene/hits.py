@@ -14,7 +14,8 @@ from wive._internal.spawn import ACCURACIES
 from wive.all_hits import row_of
 from wive.warp_kernels.lanes.precision import PRECISIONS
 from wive.warp_kernels.scene.memory import memory_errors
-from wive.warp_kernels.scene.rays import WarpRays
+from wive.warp_kernels.scene.rays import WarpRays, as_vectors
+from wive.warp_kernels.scene.sides import side_kernels
 from wive.warp_kernels.scene.spawn import bound_constants, bounds_kernel, spawn_constants, spawn_kernel
 from wive.warp_kernels.scene.surfaces import count_hits, hit_kernels, number_rays
 from wive.warp_kernels.tree.quiet import launch
@@ -61,6 +62,32 @@ class WarpHits:
         rows = self._tracer.loader.directions(directions, len(self.prim))
         inputs = [*self._tracer.mesh, self.prim, self.uv, rows, accuracy, spawn_constants(precision)]
         return self._computed(spawn_kernel(precision), PRECISIONS[precision].vec3, inputs)
+
+    @property
+    def front(self) -> Any:
+        """(n,) bool."""
+        inputs = [*self._tracer.mesh, self.prim, self._directions()]
+        return self._computed(side_kernels(self._tracer.precision).front, wp.bool, inputs)
+
+    def cosines(self) -> Any:
+        """(n,) float64."""
+        inputs = [self.normals(), self._directions()]
+        return self._computed(side_kernels(self._tracer.precision).cosines, wp.float64, inputs)
+
+    def interpolate(self, vertex_values: ArrayLike) -> Any:
+        """(n,) or (n,k) float32 or float64; (n,) vec2 or vec3 if k is 2 or 3."""
+        with memory_errors():
+            values = self._tracer.loader.vertex_values(vertex_values, len(self.vertices))
+            rows = values if values.ndim == 2 else values.reshape((-1, 1))
+            answer = wp.empty((len(self.prim), rows.shape[1]), dtype=rows.dtype, device=self.prim.device)
+        inputs = [rows, self._tracer.mesh[1], self.prim, self.uv]
+        kernel = side_kernels(self._tracer.precision).interpolate
+        launch(kernel, answer.shape, inputs, [answer], device=answer.device)
+        return answer.flatten() if values.ndim == 1 else as_vectors(answer)
+
+    def _directions(self) -> Any:
+        assert self._rays is not None
+        return self._rays.directions
 
     def __len__(self) -> int:
         """Number of rays."""

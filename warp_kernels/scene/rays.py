@@ -7,7 +7,7 @@ import numpy as np
 import warp as wp
 
 from wive._internal import arguments
-from wive._internal.arrays import NUMPY, Library, library_of, lies_on
+from wive._internal.arrays import NUMPY, WARP_NUMBERS, Library, library_of, lies_on
 from wive._internal.distant import Traced
 from wive._internal.precision import FLOAT32, Floats, Real
 from wive._internal.rays import Rays
@@ -107,6 +107,27 @@ class RayLoader:
             )
         return array
 
+    def vertex_values(self, value: Any, count: int) -> Any:
+        """(count,) or (count,k) float32 or float64; NumPy's are copied to the device."""
+        library = library_of(value)
+        if library is NUMPY:
+            return wp.array(arguments.vertex_values(value, count), device=self.device, copy=False)
+        place = library.device(value)
+        if not lies_on(place, self.device):
+            raise ValueError(
+                f"vertex_values must be on the device of the hits, {self.device}, "
+                f"got an array on {place or 'a CUDA device'}: copy it there"
+            )
+        array = WARP_NUMBERS.from_warp(self._converted("vertex_values", value, library).contiguous())
+        if array.ndim not in (1, 2) or len(array) != count:
+            raise ValueError(
+                f"vertex_values must have shape ({count},) or ({count}, k), one row per vertex, "
+                f"got {_shape(array)}"
+            )
+        if array.dtype not in (wp.float32, wp.float64):
+            raise _not_converted("vertex_values", "float32 or float64", wp.types.type_repr(array.dtype))
+        return array
+
     def _vectors(self, name: str, value: Any, library: Library) -> tuple[Any, bool]:
         """(n,) vec3 and False, or the (1,) that all rays share and True."""
         if library is NUMPY:
@@ -147,18 +168,39 @@ class RayLoader:
 
     def _checked(self, name: str, value: Any, library: Library) -> Any:
         """The array as Warp's: of the scene's numbers or of vectors of three."""
-        found: object = getattr(value, "dtype", "another type")
+        array = self._converted(name, value, library)
+        if array.dtype in (self._vec3, self._real):
+            return array
+        raise _not_converted(name, self.precision, wp.types.type_repr(array.dtype))
+
+    def _converted(self, name: str, value: Any, library: Library) -> Any:
+        """The array as Warp's; TypeError for a type that Warp has no name for."""
         try:
-            array = library.to_warp(value, self.device)
-            if array.dtype in (self._vec3, self._real):
-                return array
-            found = wp.types.type_repr(array.dtype)
+            return library.to_warp(value, self.device)
         except (RuntimeError, TypeError, ValueError, BufferError):
-            pass  # a type that Warp has no name for: `found` is its library's name
-        raise TypeError(
-            f"{name} must be {self.precision} on a Warp device, where nothing is converted, got {found}: "
-            "convert it first"
-        )
+            found: object = getattr(value, "dtype", "another type")
+            raise _not_converted(name, self.precision, found) from None
+
+
+def _not_converted(name: str, expected: str, found: object) -> TypeError:
+    return TypeError(
+        f"{name} must be {expected} on a Warp device, where nothing is converted, got {found}: "
+        "convert it first"
+    )
+
+
+def as_vectors(array: Any) -> Any:
+    """(n,2) or (n,3) numbers as (n,) vectors, over the same memory; others as they are."""
+    vectors = {
+        (2, wp.float32): wp.vec2, (3, wp.float32): wp.vec3,
+        (2, wp.float64): wp.vec2d, (3, wp.float64): wp.vec3d,
+    }  # fmt: skip
+    dtype = vectors.get((array.shape[1], array.dtype))
+    if dtype is None:
+        return array
+    view = wp.array(ptr=array.ptr, dtype=dtype, shape=(len(array),), device=array.device, copy=False)
+    view._owner = array
+    return view
 
 
 def _view(array: Any, count: int, stride: int) -> Any:

@@ -102,8 +102,8 @@ class WarpArrays(_OnWarpStream):
             (2, "float32"): wp.vec2, (3, "float32"): wp.vec3,
             (2, "float64"): wp.vec2d, (3, "float64"): wp.vec3d,
         }  # fmt: skip
-        as_vectors = array.ndim == 2 and self.vectors
-        dtype = {"dtype": vectors[array.shape[1], array.dtype.name]} if as_vectors else {}
+        rows = (array.shape[1], array.dtype.name) if array.ndim == 2 and self.vectors else None
+        dtype = {"dtype": vectors[rows]} if rows in vectors else {}
         return wp.array(array, device="cpu", copy=False, **dtype)
 
     def to_warp(self, array: Any, device: str) -> Any:
