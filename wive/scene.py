@@ -20,6 +20,7 @@ from wive._internal.arguments import (
 )
 from wive._internal.cpu_tracer import CpuTracer
 from wive._internal.files import PathLike, file_name
+from wive._internal.heightfield import heightfield_mesh
 from wive._internal.host_arrays import host_array
 from wive._internal.lines import one_line
 from wive._internal.mesh_objects import MeshObject, mesh_arrays
@@ -118,6 +119,30 @@ class Scene:
         hold finer numbers than float32.
         """
         return cls(*load_mesh(source, dtype, file_type=file_type), **kwargs)
+
+    @classmethod
+    def from_heightfield(cls, z: ArrayLike, x: ArrayLike, y: ArrayLike, **kwargs: Any) -> Scene:
+        """A scene over a grid of heights, such as a digital elevation model; keywords are those of `Scene`.
+
+        Each cell between four heights is two triangles that share the diagonal from its vertex [i, j] to
+        [i+1, j+1]. Their normals point up.
+
+        Arguments:
+            z: (rows, columns) heights. A NaN or masked one is a hole: the cells around it are left out. Mask
+                the number that stands for no data.
+            x: (columns,) and
+            y: (rows,) their coordinates, each ascending or descending, not necessarily in even steps.
+
+        The scene is float64 if one of the three is an array of float64, as survey coordinates need, else
+        float32. Vertex i * columns + j is z[i, j]. Triangle `prim` lies in the cell of rows i, i + 1 and
+        columns j, j + 1 for i, j = divmod(prim // 2, columns - 1); even ones have vertex [i, j+1], odd ones
+        [i+1, j]. Left out cells count, too.
+
+        Raises ValueError or TypeError, in one line naming the argument.
+
+        >>> scene = wive.Scene.from_heightfield(elevation, easting, northing)
+        """
+        return cls(*heightfield_mesh(z, x, y, kwargs.get("accuracy", "watertight")), **kwargs)
 
     @overload
     def intersect(
