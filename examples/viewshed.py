@@ -65,10 +65,9 @@ def main() -> None:
         place = row * 8, column * 5
         is_top = place == (top // z.shape[1] // 8 * 8, top % z.shape[1] // 5 * 5)
         print("^" if is_top else "#" if seen[place] else ".", end="\n" if column == 79 else "")
-    print(f"{100 * seen.mean():.1f} % of the land is seen from the highest place. At the lowest one the")
-    print(
-        f"horizon is up to {horizons.max():.1f} degrees high, the sky view factor is {sky_view(horizons):.3f}."
-    )
+    print(f"{100 * seen.mean():.1f} % of the land is seen from the highest place. At the lowest place the")
+    height, sky = horizons.max(), sky_view(horizons)
+    print(f"horizon is up to {height:.1f} degrees high, and the sky view factor is {sky:.3f}.")
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""The programs in README.md, docs/libraries.md and docs/warp.md run as they are printed."""
+"""The programs in README.md and in the pages of docs/ run as they are printed."""
 
 import re
 import subprocess
@@ -45,3 +45,13 @@ def test_the_libraries_pages_programs_print_what_they_say(program: str, tmp_path
 @pytest.mark.parametrize("number", range(len(programs("docs/warp.md"))))
 def test_the_warp_pages_programs_run(number: int, tmp_path: Path, device: str) -> None:
     assert run(programs("docs/warp.md")[number], tmp_path) != ""
+
+
+PROGRAMS = [(page, i) for page in ("docs/sensors.md", "docs/terrain.md") for i in range(len(programs(page)))]
+
+
+@pytest.mark.parametrize(("page", "number"), PROGRAMS)
+def test_programs_of_pages_print_what_they_say(page: str, number: int, tmp_path: Path) -> None:
+    program = programs(page)[number]
+    printed = run(program, tmp_path).strip()
+    assert program.endswith(f"# {printed}\n")
