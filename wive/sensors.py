@@ -87,7 +87,8 @@ class OrthographicCamera:
         forward, right, top = view_axes(self.eye, self.target, self.up)
         half = float(self.view_height) / 2
         eye = arguments.vector("eye", self.eye)
-        return rays_of(eye + plane(right * half * width / height, top * half, width, height), forward, dtype)
+        places = plane(eye, right * half * width / height, top * half, width, height)
+        return rays_of(places, (forward,), dtype)
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,7 +119,7 @@ class EquirectangularCamera:
         forward, right, top = view_axes(self.eye, self.target, self.up)
         axes = np.stack([forward, right, top])
         directions = on_sphere(np.pi * pixel_centres(width), np.pi / 2 * pixel_centres(height)[::-1], axes)
-        return rays_of(arguments.vector("eye", self.eye), directions, dtype)
+        return rays_of((arguments.vector("eye", self.eye),), (directions,), dtype)
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,8 +149,7 @@ class SpinningLidar:
         """Origins and directions (beams, steps, 3). Directions have length 1: the t of a hit is its range."""
         elevations, azimuths = self._angles()
         rotation, position = pose_of(self.pose)
-        x, y, z = rotation.T
-        return rays_of(position, on_sphere(azimuths, elevations, np.stack([x, y, z])), dtype)
+        return rays_of((position,), (on_sphere(azimuths, elevations, rotation.T),), dtype)
 
     def _angles(self) -> tuple[Float64, Float64]:
         """Elevations and azimuths in radians."""

@@ -9,6 +9,7 @@ wp = pytest.importorskip("warp")
 from wive.warp_kernels.lanes.precision import PRECISIONS
 from wive.warp_kernels.scene import hits as warp_hits
 from wive.warp_kernels.scene import shading as warp_shading
+from wive.warp_kernels.scene import sides as warp_sides
 from wive.warp_kernels.scene import spawn as warp_spawn
 
 ARCHITECTURES = (80, 90, 100)
@@ -24,6 +25,7 @@ def modules() -> dict[str, tuple[wp.Module, tuple[str, ...]]]:
             ("mask", "points", "normals"),
         )
         kernels = warp_spawn.bounds_kernel(precision), warp_spawn.spawn_kernel(precision)
+        found[f"sides {precision}"] = warp_sides.side_kernels(precision).front.module, ("front", "cosines")
         found[f"spawn {precision}"] = kernels[0].module, ("bound_errors", "spawn_origins")
     return found
 

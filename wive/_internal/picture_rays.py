@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -28,22 +29,23 @@ def pixel_centres(count: int) -> Float64:
 def perspective(frame: Float64, width: int, height: int, dtype: DTypeLike) -> tuple[Floats, Floats]:
     """The rays from frame[0] through frame[1] + x frame[2] + y frame[3], x and y from -1 to 1, y upwards."""
     eye, centre, right, top = frame
-    return rays_of(eye, centre + plane(right, top, width, height), dtype)
+    return rays_of((eye,), plane(centre, right, top, width, height), dtype)
 
 
-def plane(right: Float64, top: Float64, width: int, height: int) -> Float64:
-    """(h,w,3) vectors from the picture's centre to those of its pixels."""
-    expect_room(2 * 3 * width * height, np.float64)
-    across, upward = pixel_centres(width)[:, None] * right, pixel_centres(height)[::-1, None] * top
-    return np.asarray(upward[:, None] + across)
+def plane(centre: Float64, right: Float64, top: Float64, width: int, height: int) -> tuple[Float64, Float64]:
+    """(h,1,3) and (w,3): the sum is where the pixels are, on the plane that `right` and `top` span."""
+    return centre + pixel_centres(height)[::-1, None, None] * top, pixel_centres(width)[:, None] * right
 
 
-def rays_of(origins: Float64, directions: Float64, dtype: DTypeLike) -> tuple[Floats, Floats]:
-    """Origins and directions (h,w,3), one of which may be (3,), as arrays of that dtype and shape."""
+def rays_of(
+    origins: tuple[Float64, ...], directions: tuple[Float64, ...], dtype: DTypeLike
+) -> tuple[Floats, Floats]:
+    """Origins and directions (h,w,3) of that dtype, each the sum of one or two arrays of like shapes."""
     real: np.dtype[Any] = real_named(dtype).dtype
-    shape = np.broadcast_shapes(origins.shape, directions.shape)
-    expect_room(2 * 3 * int(np.prod(shape[:-1], dtype=np.int64)), real)
-    filled = np.empty(shape, real), np.empty(shape, real)
+    shape = np.broadcast_shapes(*(part.shape for part in origins + directions))
+    expect_room(2 * math.prod(shape), real)
+    rays = np.empty(shape, real), np.empty(shape, real)
     with np.errstate(over="ignore"):
-        filled[0][:], filled[1][:] = origins, directions
-    return filled
+        for array, parts in zip(rays, (origins, directions), strict=True):
+            np.add(parts[0], parts[1] if len(parts) > 1 else 0.0, out=array, casting="same_kind")
+    return rays

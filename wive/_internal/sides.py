@@ -42,15 +42,21 @@ def meets_front(
 
 def cosines_of(normals: Float64, directions: Floats) -> Float64:
     """(n,) |normal . direction| / |direction| of unit normals (n,3)."""
-    with np.errstate(all="ignore"):
-        x, y, z = _scaled(directions.astype(np.float64)).T
-        along = abs(normals[:, 0] * x + normals[:, 1] * y + normals[:, 2] * z)
-        return np.asarray(np.minimum(along / np.sqrt(x * x + y * y + z * z), 1.0))
+    cosines = np.empty(len(normals))
+    for first in range(0, len(normals), BLOCK):
+        block = slice(first, first + BLOCK)
+        n = normals[block].T
+        with np.errstate(all="ignore"):
+            x, y, z = _scaled(directions[block].astype(np.float64)).T
+            along = abs(n[0] * x + n[1] * y + n[2] * z)
+            cosines[block] = np.minimum(along / np.sqrt(x * x + y * y + z * z), 1.0)
+    return cosines
 
 
 def _scaled(directions: Float64) -> Float64:
     """The directions times powers of two, so that no product over- or underflows."""
-    _, exponents = np.frexp(abs(directions).max(axis=1, initial=0))
+    x, y, z = abs(directions).T
+    _, exponents = np.frexp(np.maximum(np.maximum(x, y), z))
     return np.asarray(np.ldexp(directions, -exponents[:, None]))
 
 
