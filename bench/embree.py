@@ -1,10 +1,10 @@
-"""Single rays against native Embree 4 on the very same arrays: speed, build time, SAH cost, memory.
+"""wive against native Embree 4 on the very same arrays: speed, build time, SAH cost, memory.
 
 wive with one thread and a given number of rays in flight (1: plain single-ray traversal; tuned: what a batch
 gets), against a loop over rtcIntersect1 or rtcOccluded1; float32 and compressed nodes; fast against
 Embree's default, watertight against its robust flag; each kernel against Embree held to the same
 instruction set. A ratio above 1 means that wive is faster. `mismatches` counts rays that only one side
-hits.
+hits. The part `packets` races what a batch gets on primary rays against rtcIntersect1, 8 and 16.
 """
 
 import argparse
@@ -14,7 +14,7 @@ from itertools import product
 
 from bench.contenders.build_race import build_rows, tree_row
 from bench.contenders.compiled_shim import BenchError
-from bench.contenders.embree_race import TUNED, Contender, speed_rows
+from bench.contenders.embree_race import TUNED, Contender, packet_rows, speed_rows
 from bench.figures.embree_figure import draw
 from bench.support import report
 from bench.support.options import ACCURACIES, NODES, in_flights, listed, scene_parser
@@ -24,7 +24,7 @@ from bench.support.timing import QUICK, Effort, geometric_mean
 from wive import _cpu
 
 KERNELS = ("avx512", "avx2")
-PARTS = ("speed", "build", "tree")
+PARTS = ("speed", "packets", "build", "tree")
 BUILD_THREADS = (1, 2)
 IN_FLIGHT = (1, TUNED)
 RAYS = 65_536  # of each kind and scene
@@ -33,6 +33,10 @@ QUICK_RAYS = 16_384
 
 SPEED_COLUMNS = [
     "scene", "triangles", "accuracy", "kernel", "in_flight", "nodes", "rays", "count", "ratio", "low", "high",
+    "wive_mrays", "embree_mrays", "rounds", "mismatches",
+]  # fmt: skip
+PACKET_COLUMNS = [
+    "scene", "triangles", "accuracy", "kernel", "rays", "count", "width", "ratio", "low", "high",
     "wive_mrays", "embree_mrays", "rounds", "mismatches",
 ]  # fmt: skip
 PROGRESS = ("scene", "accuracy", "kernel", "in_flight", "nodes", "rays", "ratio")
@@ -57,6 +61,7 @@ def main(options: Sequence[str]) -> None:
     # Node forms differ in the memory they read, not by instruction set: one kernel is enough for the others.
     contenders = [Contender(*way) for way in ways if way[0] == kernels[0] or way[2] == chosen.nodes[0]]
     speed: list[report.Row] = []
+    packets: list[report.Row] = []
     build: list[report.Row] = []
     trees: list[report.Row] = []
     for name in scenes.names:
@@ -77,10 +82,18 @@ def main(options: Sequence[str]) -> None:
                 for row in speed_rows(mesh, accuracy, contenders, sets, effort, chosen.ftz):
                     speed.append(row)
                     report.print_progress(row, PROGRESS)
+        if "packets" in chosen.parts:
+            rays = recorded_rays(mesh)["primary"]
+            effort = QUICK if chosen.quick else EFFORT
+            for kernel, accuracy in product(kernels, chosen.accuracy):
+                for row in packet_rows(mesh, accuracy, kernel, rays, effort, chosen.ftz):
+                    packets.append(row)
+                    report.print_progress(row, ("scene", "accuracy", "kernel", "width", "ratio"))
 
     means = mean_rows(speed)
     report.print_table(speed, SPEED_COLUMNS, "Speed, one thread: Embree's seconds over wive's")
     report.print_table(means, MEAN_COLUMNS, "Speed over all scenes: geometric mean and lowest")
+    report.print_table(packets, PACKET_COLUMNS, "Primary rays: seconds of Embree's packets over wive's")
     report.print_table(build, BUILD_COLUMNS, "Build, equal threads: Embree's seconds over wive's")
     report.print_table(
         trees, TREE_COLUMNS, "Trees, wive's over Embree's: SAH relative to the root, bytes per triangle"
@@ -90,6 +103,7 @@ def main(options: Sequence[str]) -> None:
         "intersectors": sorted({row["intersector"] for row in trees}),
         "speed": speed,
         "means": means,
+        "packets": packets,
         "build": build,
         "trees": trees,
     }

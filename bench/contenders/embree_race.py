@@ -7,7 +7,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.contenders.native_embree import EmbreeMesh, Isa, Quality, flushed_denormals
+from bench.contenders.native_embree import EmbreeMesh, Isa, Quality, Width, flushed_denormals
 from bench.support.options import Accuracy, Nodes
 from bench.support.rays import Rays
 from bench.support.report import Row
@@ -15,6 +15,7 @@ from bench.support.scenes import Mesh
 from bench.support.timing import Comparison, Effort, compare, one_core, timed
 from wive import _cpu
 
+PACKET_WIDTHS: tuple[Width, ...] = (1, 8, 16)  # of Embree
 TUNED = 0  # in flight: as many rays as the core chooses
 
 
@@ -76,14 +77,44 @@ def speed_rows(
                 }
 
 
+def packet_rows(
+    mesh: Mesh, accuracy: Accuracy, kernel: str, rays: Rays, effort: Effort, flush_denormals: bool
+) -> Iterator[Row]:
+    """One row per width of Embree's packets, wive with its default rays in flight: closest hits."""
+    contender = Contender(kernel, TUNED)
+    ours = _cpu.Bvh(mesh.vertices, mesh.faces, accuracy)
+    with embree_tree(mesh, accuracy, contender.isa) as theirs:
+        theirs.commit()
+        for width in PACKET_WIDTHS:
+            with one_core(), flushed_denormals(flush_denormals):
+                comparison, mismatches = race(ours, theirs, contender, rays, effort, width)
+            yield {
+                "scene": mesh.name,
+                "triangles": len(mesh.faces),
+                "accuracy": accuracy,
+                "kernel": kernel,
+                "isa": contender.isa,
+                "rays": rays.kind,
+                "count": len(rays),
+                "width": width,
+                **quartiles(comparison),
+                "wive_mrays": len(rays) / comparison.our_seconds * 1e-6,
+                "embree_mrays": len(rays) / comparison.their_seconds * 1e-6,
+                "mismatches": mismatches,
+            }
+
+
 def race(
-    ours: _cpu.Bvh, theirs: EmbreeMesh, contender: Contender, rays: Rays, effort: Effort
+    ours: _cpu.Bvh, theirs: EmbreeMesh, contender: Contender, rays: Rays, effort: Effort, width: Width = 1
 ) -> tuple[Comparison, int]:
-    """The times of both sides on one set of rays, and the number of rays that only one side hits."""
+    """The times of both sides on one set of rays, and the number of rays that only one side hits.
+
+    `width`: rays per call of Embree, for closest hits.
+    """
     runs = (
         _any_hit(ours, theirs, contender, rays)
         if rays.any_hit
-        else _closest_hit(ours, theirs, contender, rays)
+        else _closest_hit(ours, theirs, contender, rays, width)
     )
     our_run, their_run = runs
     mismatches = int(np.count_nonzero(our_run() != their_run()))  # warms up
@@ -93,7 +124,9 @@ def race(
 Run = Callable[[], NDArray[np.bool_]]
 
 
-def _closest_hit(ours: _cpu.Bvh, theirs: EmbreeMesh, contender: Contender, rays: Rays) -> tuple[Run, Run]:
+def _closest_hit(
+    ours: _cpu.Bvh, theirs: EmbreeMesh, contender: Contender, rays: Rays, width: Width
+) -> tuple[Run, Run]:
     def our_run() -> NDArray[np.bool_]:
         _, prim, _, _ = ours.intersect(
             contender.kernel, *rays.arrays, threads=1, in_flight=contender.in_flight
@@ -101,7 +134,7 @@ def _closest_hit(ours: _cpu.Bvh, theirs: EmbreeMesh, contender: Contender, rays:
         return prim >= 0
 
     def their_run() -> NDArray[np.bool_]:
-        _, prim, _ = theirs.intersect(*rays.arrays)
+        _, prim, _ = theirs.intersect(*rays.arrays, width)
         return prim >= 0
 
     return our_run, their_run

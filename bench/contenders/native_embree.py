@@ -1,4 +1,4 @@
-"""Embree 4 called natively on NumPy arrays, one ray at a time."""
+"""Embree 4 called natively on NumPy arrays, one ray at a time or in packets."""
 
 import ctypes
 from collections.abc import Iterator
@@ -13,6 +13,7 @@ from bench.contenders.compiled_shim import BenchError, open_shim
 
 Isa = Literal["sse2", "avx", "avx2", "avx512"]
 Quality = Literal["low", "medium", "high"]
+Width = Literal[1, 8, 16]  # rays per call
 QUALITIES: dict[Quality, int] = {"low": 0, "medium": 1, "high": 2}  # enum RTCBuildQuality
 
 NATIVE_RAY8, NATIVE_RAY16 = 33, 34  # enum RTCDeviceProperty: supported from AVX and from AVX-512 on
@@ -57,7 +58,9 @@ def _shim() -> ctypes.CDLL:
     shim.shim_restore_control.restype = None
     shim.shim_restore_control.argtypes = [ctypes.c_uint]
     shim.shim_intersect.restype = None
-    shim.shim_intersect.argtypes = [Pointer, ctypes.POINTER(_Rays), Pointer, Pointer, Pointer]
+    shim.shim_intersect.argtypes = [
+        Pointer, ctypes.POINTER(_Rays), ctypes.c_uint, Pointer, Pointer, Pointer,
+    ]  # fmt: skip
     shim.shim_occluded.restype = None
     shim.shim_occluded.argtypes = [Pointer, ctypes.POINTER(_Rays), Pointer]
     return shim
@@ -150,13 +153,17 @@ class EmbreeMesh:
         directions: NDArray[np.float32],
         tmin: NDArray[np.float32],
         tmax: NDArray[np.float32],
+        width: Width = 1,
     ) -> tuple[NDArray[np.float32], NDArray[np.int32], NDArray[np.float32]]:
-        """Closest hits by rtcIntersect1: t (n,), tmax on a miss, prim (n,), -1 on a miss, uv (n,2)."""
+        """Closest hits by rtcIntersect1, 8 or 16: t (n,), prim (n,), uv (n,2).
+
+        t is tmax and prim -1 on a miss. Packets have Embree's flag for coherent rays.
+        """
         rays = _rays(origins, directions, tmin, tmax)
         t = np.empty(rays.count, np.float32)
         prim = np.empty(rays.count, np.int32)
         uv = np.empty((rays.count, 2), np.float32)
-        _shim().shim_intersect(self._mesh, rays, t.ctypes.data, prim.ctypes.data, uv.ctypes.data)
+        _shim().shim_intersect(self._mesh, rays, width, t.ctypes.data, prim.ctypes.data, uv.ctypes.data)
         return t, prim, uv
 
     @property

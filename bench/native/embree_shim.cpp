@@ -1,4 +1,4 @@
-// Embree's single-ray calls in a loop over arrays, as C functions for ctypes.
+// Embree's calls for one ray and for packets of 8 and 16 in a loop over arrays, as C functions for ctypes.
 //
 // The embreex wheel carries Embree's shared library but no headers, so the few types and constants of Embree 4's
 // C interface that are needed are defined here (names and values: include/embree4 of Embree 4.4, Apache-2.0).
@@ -7,6 +7,7 @@
 #include <dlfcn.h>
 #include <xmmintrin.h>
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <cstddef>
@@ -46,6 +47,18 @@ struct RayHit {
 };
 static_assert(sizeof(Ray) == 48 && sizeof(RayHit) == 96);
 
+// RTCRayN and RTCHitN: a row per field.
+template <unsigned width>
+struct alignas(4 * width) RayHitPacket {
+    float org_x[width], org_y[width], org_z[width], tnear[width];
+    float dir_x[width], dir_y[width], dir_z[width], time[width];
+    float tfar[width];
+    unsigned mask[width], id[width], flags[width];
+    float ng_x[width], ng_y[width], ng_z[width], u[width], v[width];
+    unsigned prim[width], geometry[width], instance[width], instance_prim[width];
+};
+static_assert(sizeof(RayHitPacket<16>) == 21 * 64);
+
 struct QueryContext {
     unsigned instance, instance_prim;
 };
@@ -58,6 +71,7 @@ struct QueryArguments {  // RTCIntersectArguments and RTCOccludedArguments have 
     void* callback = nullptr;
 };
 
+constexpr int query_flag_coherent = 1 << 16;
 constexpr int scene_flag_robust = 4;
 constexpr int geometry_type_triangle = 0;
 constexpr int buffer_type_index = 0, buffer_type_vertex = 1;
@@ -83,7 +97,9 @@ constexpr int format_uint3 = 0x5003, format_float3 = 0x9003;
     X(rtcCommitGeometry, void, (Handle))                                                               \
     X(rtcAttachGeometry, unsigned, (Handle, Handle))                                                   \
     X(rtcIntersect1, void, (Handle, RayHit*, QueryArguments*))                                         \
-    X(rtcOccluded1, void, (Handle, Ray*, QueryArguments*))
+    X(rtcOccluded1, void, (Handle, Ray*, QueryArguments*))                                             \
+    X(rtcIntersect8, void, (const int*, Handle, RayHitPacket<8>*, QueryArguments*))                    \
+    X(rtcIntersect16, void, (const int*, Handle, RayHitPacket<16>*, QueryArguments*))
 
 #define DECLARE(name, result, arguments) result(*name) arguments = nullptr;
 EMBREE_FUNCTIONS(DECLARE)
@@ -127,6 +143,40 @@ Ray constant_fields() {
     Ray ray{};
     ray.mask = ~0u;
     return ray;
+}
+
+// Closest hits of the rays in packets of consecutive ones; the last may have fewer.
+template <unsigned width>
+void intersect_packets(void (*trace)(const int*, Handle, RayHitPacket<width>*, QueryArguments*), const Mesh& mesh,
+                       const Rays& rays, float* t, std::int32_t* prim, float* uv) {
+    QueryContext context{invalid_id, invalid_id};
+    QueryArguments arguments;
+    arguments.context = &context;
+    arguments.flags = query_flag_coherent;  // what a user of packets would ask for
+    RayHitPacket<width> packet{};
+    alignas(4 * width) int valid[width];
+    for (std::size_t first = 0; first < rays.count; first += width) {
+        const auto used = static_cast<unsigned>(std::min<std::size_t>(width, rays.count - first));
+        for (unsigned i = 0; i < used; ++i) {
+            Ray ray = constant_fields();
+            rays.load(first + i, ray);
+            packet.org_x[i] = ray.org_x, packet.org_y[i] = ray.org_y, packet.org_z[i] = ray.org_z;
+            packet.dir_x[i] = ray.dir_x, packet.dir_y[i] = ray.dir_y, packet.dir_z[i] = ray.dir_z;
+            packet.tnear[i] = ray.tnear, packet.tfar[i] = ray.tfar;
+        }
+        for (unsigned i = 0; i < width; ++i) {
+            valid[i] = i < used ? -1 : 0;
+            packet.mask[i] = ~0u;
+            packet.prim[i] = packet.geometry[i] = packet.instance[i] = invalid_id;
+        }
+        trace(valid, mesh.scene, &packet, &arguments);
+        for (unsigned i = 0; i < used; ++i) {
+            t[first + i] = packet.tfar[i];
+            prim[first + i] = static_cast<std::int32_t>(packet.prim[i]);
+            uv[2 * (first + i)] = packet.u[i];
+            uv[2 * (first + i) + 1] = packet.v[i];
+        }
+    }
 }
 
 }  // namespace
@@ -205,7 +255,10 @@ void shim_trim_heap() {
 
 void shim_restore_control(unsigned word) { _mm_setcsr(word); }
 
-void shim_intersect(const Mesh* mesh, const Rays* rays, float* t, std::int32_t* prim, float* uv) {
+// width: rays per call, 1, 8 or 16.
+void shim_intersect(const Mesh* mesh, const Rays* rays, unsigned width, float* t, std::int32_t* prim, float* uv) {
+    if (width == 8) return intersect_packets<8>(rtcIntersect8, *mesh, *rays, t, prim, uv);
+    if (width == 16) return intersect_packets<16>(rtcIntersect16, *mesh, *rays, t, prim, uv);
     QueryContext context{invalid_id, invalid_id};
     QueryArguments arguments;
     arguments.context = &context;
@@ -225,7 +278,7 @@ void shim_intersect(const Mesh* mesh, const Rays* rays, float* t, std::int32_t* 
 void shim_trace(const void* mesh, std::size_t count, const float* origins, const float* directions, float tmin,
                 float tmax, float* t, std::int32_t* prim, float* uv) {
     const Rays rays{count, origins, directions, &tmin, &tmax, 0, 0};
-    shim_intersect(static_cast<const Mesh*>(mesh), &rays, t, prim, uv);
+    shim_intersect(static_cast<const Mesh*>(mesh), &rays, 1, t, prim, uv);
 }
 
 void shim_occluded(const Mesh* mesh, const Rays* rays, std::uint8_t* occluded) {
