@@ -152,13 +152,15 @@ def test_meshes_added_after_a_query_are_hit():
     tree = scene.scene
     assert scene.run(above(3), DOWN).tolist() == [0]
     assert scene.scene is tree  # built once
+    assert scene.run(above(3, -1), DOWN, output=True)["Ng"].tolist() == [[0, 0, 1], [0, 0, 0]]
     stacked([-2, 2], scene=scene)
     assert scene.is_committed == 0
     TriangleMesh(scene, np.zeros((0, 3), np.float32), np.zeros((0, 3), int))
-    TriangleMesh(scene, np.array([[0, 0, 1], [1, 0, 1], [0, 1, 1]]), np.array([[0, 1, 2]] * 2))
+    TriangleMesh(scene, np.array([[0, 0, 1], [2, 0, 1], [0, 1, 1]]), np.array([[0, 1, 2]] * 2))
     found = scene.run(above(3, 1.5, 0.5, -1, -3), DOWN, output=True)
     assert found["geomID"].tolist() == [2, 4, 0, 1, -1]
     assert found["primID"].tolist() == [0, 0, 0, 0, -1]
+    assert found["Ng"][:, 2].tolist() == [1, 2, 1, 1, 0]
     assert len(scene.scene) == 5
 
 

@@ -45,6 +45,7 @@ class EmbreeScene:
         self._accuracy: AccuracyOption = "watertight" if robust else "fast"
         self._scene = Scene(np.zeros((0, 3), np.float32), np.zeros((0, 3), np.int32))
         self._added: list[tuple[Floats, NDArray[np.int32]]] = []  # since the tree was built
+        self._normals: NDArray[np.float32] | None = None  # of the tree's triangles, from when they are needed
         self._starts = np.zeros(1, np.int64)  # the first triangle of each mesh, and the number of all
 
     @property
@@ -57,7 +58,7 @@ class EmbreeScene:
                 faces.append(triangles + np.int32(count))
                 count += len(vertices)
             self._scene = Scene(np.concatenate(parts), np.concatenate(faces), accuracy=self._accuracy)
-            self._added = []
+            self._added, self._normals = [], None
             self.is_committed = 1
         return self._scene
 
@@ -133,38 +134,36 @@ class EmbreeScene:
         if len(directions) == 1:
             directions = directions[0]
         ends = arguments.limits("dists", FAR if dists is None else dists, count)
-        if ends.size == 1:
-            ends = np.broadcast_to(ends, (count,))
+        tmax = ends if ends.size == count else ends[0]
         scene, starts = self.scene, self._starts
         if query == "OCCLUDED":
-            return scene.occluded(origins, directions, self._tmin, ends).astype(np.int32) - np.int32(1)
-        hits = scene.intersect(origins, directions, self._tmin, ends)
+            return scene.occluded(origins, directions, self._tmin, tmax).astype(np.int32) - np.int32(1)
+        hits = scene.intersect(origins, directions, self._tmin, tmax)
         if query == "DISTANCE" and not output:
-            return _ends(hits, ends)
-        geom = np.searchsorted(starts[1:], hits.prim, side="right")
-        prim = np.where(hits.mask, hits.prim - starts[geom], -1).astype(np.int32)
+            return np.where(hits.mask, hits.t, ends)
+        prim, geom = _numbers(hits, starts)
         if not output:
             return prim
-        geom = np.where(hits.mask, geom, -1).astype(np.int32)
         u, v = np.where(hits.mask, hits.uv.T, np.float32(0))
-        return {
-            "u": u,
-            "v": v,
-            "Ng": _normals(hits),
-            "tfar": _ends(hits, ends),
-            "primID": prim,
-            "geomID": geom,
-        }
+        tfar = np.where(hits.mask, hits.t, ends)
+        if self._normals is None:
+            self._normals = _normals(scene)
+        normals = self._normals[hits.prim]
+        return {"u": u, "v": v, "Ng": normals, "tfar": tfar, "primID": prim, "geomID": geom}
 
 
-def _ends(hits: Hits, ends: Floats) -> Floats:
-    """(n,) float32: t, or on a miss where the ray ends."""
-    return np.where(hits.mask, hits.t, ends)
+def _numbers(hits: Hits, starts: NDArray[np.int64]) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    """(n,) int32 triangles, numbered from 0 in each mesh, and (n,) int32 meshes; -1 on a miss."""
+    if len(starts) == 2:  # one mesh
+        return hits.prim, np.minimum(hits.prim, 0)
+    geom = np.searchsorted(starts[1:], hits.prim, side="right")
+    prim = np.where(hits.mask, hits.prim - starts[geom], -1)
+    return prim.astype(np.int32), np.where(hits.mask, geom, -1).astype(np.int32)
 
 
-def _normals(hits: Hits) -> Floats:
-    """(n,3) float32 normals of the triangles hit, twice their area long, from float64; 0 on a miss."""
-    normals = np.zeros((len(hits.prim), 3), np.float32)
-    corners = hits.vertices.astype(np.float64)[hits.faces[hits.prim[hits.mask]]]
-    normals[hits.mask] = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+def _normals(scene: Scene) -> NDArray[np.float32]:
+    """(f+1,3) normals of the triangles, twice their area long, computed in float64; 0 for number -1."""
+    corners = scene.vertices.astype(np.float64)[scene.faces]
+    normals = np.zeros((len(scene) + 1, 3), np.float32)
+    normals[:-1] = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     return normals
