@@ -13,7 +13,7 @@ from wive._internal.arrays import Library
 from wive._internal.distant import Moved
 from wive._internal.error_bounds import t_error_bounds
 from wive._internal.host_arrays import host_array
-from wive._internal.interpolation import interpolated
+from wive._internal.interpolation import interpolated, vertex_values_of
 from wive._internal.precision import FLOAT64, Floats, real_of
 from wive._internal.rays import Rays
 from wive._internal.read_only import ReadOnly
@@ -188,7 +188,7 @@ class Hits(ReadOnly):
 
         >>> smooth = hits.interpolate(vertex_normals)
         """
-        values = arguments.vertex_values(host_array("vertex_values", vertex_values), len(self.vertices))
+        values = vertex_values_of(host_array("vertex_values", vertex_values), len(self.vertices))
         return interpolated(values, self.faces, self.prim, self.uv)
 
     def _directions(self, wanted: str) -> Floats:

@@ -169,7 +169,7 @@ def on_sphere(longitudes: Float64, latitudes: Float64, axes: Float64) -> Float64
 
 def _degrees(name: str, value: ArrayLike) -> Float64:
     """(n,) angles in radians."""
-    angles = np.ma.filled(arguments.array_of_numbers(name, value).astype(np.float64), np.nan)
+    angles = arguments.nan_if_masked(arguments.array_of_numbers(name, value)).astype(np.float64)
     if angles.ndim != 1:
         count = " or their number" if name == "azimuths" else ""
         raise ValueError(f"{name} must be (n,) angles in degrees{count}, got shape {angles.shape}")

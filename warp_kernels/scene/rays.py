@@ -9,6 +9,7 @@ import warp as wp
 from wive._internal import arguments
 from wive._internal.arrays import NUMPY, WARP_NUMBERS, Library, library_of, lies_on
 from wive._internal.distant import Traced
+from wive._internal.interpolation import vertex_values_of
 from wive._internal.precision import FLOAT32, Floats, Real
 from wive._internal.rays import Rays
 from wive.warp_kernels.lanes.precision import PRECISIONS, precision_of
@@ -111,7 +112,7 @@ class RayLoader:
         """(count,) or (count,k) float32 or float64; NumPy's are copied to the device."""
         library = library_of(value)
         if library is NUMPY:
-            return wp.array(arguments.vertex_values(value, count), device=self.device, copy=False)
+            return wp.array(vertex_values_of(value, count), device=self.device, copy=False)
         place = library.device(value)
         if not lies_on(place, self.device):
             raise ValueError(

@@ -10,7 +10,7 @@ from typing import Any, Literal, NamedTuple, TypedDict, TypeGuard
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
-from wive._internal.precision import FLOAT32, FLOAT64, Floats, Real, real_asked, real_of
+from wive._internal.precision import FLOAT32, Floats, Real, real_asked, real_of
 from wive._internal.room import expect_room
 from wive._internal.scalars import MOST_COUNT, shown, unreadable
 from wive._internal.scalars import choice as choice
@@ -317,15 +317,11 @@ def array_of_numbers(name: str, value: ArrayLike) -> NDArray[Any]:
     return array if mask is None else np.ma.MaskedArray(array, mask)
 
 
-def vertex_values(value: ArrayLike, count: int) -> Floats:
-    """Values (count,) or (count,k) of `count` vertices: float32 if given in that or float16, else float64."""
-    array = _numeric("vertex_values", value, "real numbers per vertex", "fiub", masked=True)
-    if array.ndim not in (1, 2) or len(array) != count:
-        raise ValueError(
-            f"vertex_values must have shape ({count},) or ({count}, k), one row per vertex, got {array.shape}"
-        )
-    is_short = array.dtype.kind == "f" and array.dtype.itemsize <= 4
-    return _missing_if_masked(value, array, FLOAT32 if is_short else FLOAT64)
+def nan_if_masked(array: NDArray[Any]) -> NDArray[Any]:
+    """The array's numbers, NaN if masked."""
+    if type(array) is np.ndarray:
+        return array
+    return np.where(np.ma.getmaskarray(array), np.nan, array.data)
 
 
 def _is_ready(value: ArrayLike, dtype: np.dtype[Any]) -> TypeGuard[Floats]:

@@ -88,10 +88,7 @@ def _axis(name: str, value: ArrayLike, count: int, what: str) -> NDArray[Any]:
 
 def _numbers(name: str, value: ArrayLike) -> NDArray[Any]:
     """Real numbers of any shape, NaN if masked."""
-    array = arguments.array_of_numbers(name, host_array(name, value))
-    if not isinstance(array, np.ma.MaskedArray):
-        return array
-    return np.where(np.ma.getmaskarray(array), np.nan, array.data)
+    return arguments.nan_if_masked(arguments.array_of_numbers(name, host_array(name, value)))
 
 
 def _is_float64(value: Any) -> bool:

@@ -1,13 +1,25 @@
 """Values given at vertices, at points of triangles."""
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from wive._internal.precision import Floats
+from wive._internal import arguments
+from wive._internal.precision import FLOAT32, FLOAT64, Floats
 from wive._internal.room import expect_room
 
 # Rows at a time, so that what is computed on the way stays in the cache.
 BLOCK = 1 << 14
+
+
+def vertex_values_of(value: ArrayLike, count: int) -> Floats:
+    """Values (count,) or (count,k) of `count` vertices: float32 if given in that or float16, else float64."""
+    array = arguments.array_of_numbers("vertex_values", value)
+    if array.ndim not in (1, 2) or len(array) != count:
+        raise ValueError(
+            f"vertex_values must have shape ({count},) or ({count}, k), one row per vertex, got {array.shape}"
+        )
+    real = FLOAT32 if array.dtype.kind == "f" and array.dtype.itemsize <= 4 else FLOAT64
+    return real.array(arguments.nan_if_masked(array))
 
 
 def interpolated(values: Floats, faces: NDArray[np.int32], prim: NDArray[np.int32], uv: Floats) -> Floats:

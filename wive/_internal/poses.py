@@ -53,7 +53,7 @@ def intrinsics_of(value: ArrayLike) -> Float64:
 def _finite(name: str, value: ArrayLike, expected: str) -> Float64:
     array = arguments.array_of_numbers(name, value)
     with np.errstate(over="ignore", invalid="ignore"):
-        numbers = np.asarray(np.ma.filled(array.astype(np.float64), np.nan))
+        numbers = arguments.nan_if_masked(array).astype(np.float64)
     if not np.isfinite(numbers).all():
         raise ValueError(f"{name} must be {expected} of finite numbers, got {shown(numbers.tolist())}")
     return numbers

@@ -67,4 +67,5 @@ def _axes(value: Any) -> int:
     """The number of axes, of lists by their first elements, so that long ones take no time."""
     if isinstance(value, list | tuple):
         return 1 + (_axes(value[0]) if value else 0)
-    return len(getattr(value, "shape", ()))
+    shape = getattr(value, "shape", ())
+    return len(shape) if isinstance(shape, tuple) else 0
