@@ -269,3 +269,28 @@ def spawn_origins(
     accuracy and constants: the members of SpawnOrigin (cpu/core/spawn.inc) other than is_float. The
     interpreter lock is released.
     """
+
+def segment_rays(
+    a: NDArray[np.float64], b: NDArray[np.float64], center: Sequence[float], threads: int = 0
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Origins and directions (n,3) of rays along segments, t = 0 to 1; ends (n,3), or (1,3) for all.
+
+    A ray starts at the end that is nearer to center (3,), so a segment and its reverse are one ray.
+    """
+
+def between(
+    vertices: NDArray[Real],
+    faces: NDArray[np.int32],
+    prim: NDArray[np.int32],
+    row: NDArray[np.int64],
+    a: NDArray[np.float64],
+    b: NDArray[np.float64],
+    constants: Sequence[float],
+    errors: Sequence[float],
+    threads: int = 0,
+) -> NDArray[np.bool_]:
+    """(h,) whether the planes of triangles prim (h,) separate the ends of segments row (h,).
+
+    constants: the members of Separation (cpu/core/separation.inc); errors: those of a and of b. False for no
+    triangle. The interpreter lock is released.
+    """

@@ -26,7 +26,9 @@ from wive._internal.lines import one_line
 from wive._internal.mesh_objects import MeshObject, mesh_arrays
 from wive._internal.precision import Floats, Precision, real_of
 from wive._internal.rays import Rays, check_rays
+from wive._internal.segments import visible
 from wive._internal.shaped import query_shaped
+from wive._internal.spawn import spawn_from
 from wive._internal.storage import FORMAT_VERSION, Options, read_scene, refuse_newer, write_scene
 from wive._internal.tracer import Tracer
 from wive.all_hits import AllHits
@@ -326,6 +328,54 @@ class Scene:
         return self._query(
             self._tracer.count, (origins, directions, tmin, tmax), threads, in_flight, lanes, stats, touching
         )
+
+    def visible(self, a: ArrayLike, b: ArrayLike, *, threads: int | None = None) -> NDArray[np.bool_]:
+        """(n,) bool: whether the open segment between each point of `a` and its point of `b` is free.
+
+        A triangle is in the way if the segment meets it and it separates the ends: each is farther off the
+        plane of the triangle than rounding moves a point on it. So points on surfaces are not hidden by the
+        triangles they lie on: `hits.points()`, vertices, centres, samples, in float32 as well;
+        docs/accuracy.md, "Line of sight", has that distance, and recipes. Surfaces have no inside here: two
+        points of a sphere see each other through it. A point sees itself; one with a coordinate that is NaN,
+        infinite, masked or beyond 1e18 is seen by none. `visible(b, a)` is the same.
+
+        Arguments:
+            a, b: (n,3) real numbers, or (3,) for all; torch, Warp and DLPack arrays in host memory give an
+                array of their library. Points are not rounded to the scene's precision, their rays are.
+            threads: how many to use; None is every core. For CPU backends.
+
+        Raises ValueError or TypeError, in one line naming the argument.
+
+        >>> seen = scene.visible(observer, hits.points())
+        """
+        tracer = self._tracer
+        work = arguments.work(tracer.backend, tracer.lacks, threads, None, "auto", False)
+        free: NDArray[np.bool_] = visible(tracer, self._faces, a, b, work)
+        return free
+
+    def spawn(self, prim: ArrayLike, uv: ArrayLike, directions: ArrayLike) -> Floats:
+        """(n,3) origins for rays that leave the surface from points of yours, as `Hits.spawn` from hits.
+
+        A ray from there along its direction, with tmin = 0, doesn't hit the triangle that it leaves.
+
+        Arguments:
+            prim: (n,) integers, rows of `faces`; -1 for no triangle, and a zero-area one, give NaN, and rays
+                from there miss.
+            uv: (n,2) real numbers, or (2,) for all: the point is (1-u-v) v0 + u v1 + v v2, for example
+                (1/3, 1/3) for the middle of each triangle.
+            directions: (n,3) real numbers, or (3,) for all; of any length.
+
+        Arrays of torch, Warp or DLPack must be in host memory; the answer is of their library. It is float32,
+        or float64 for a float64 scene.
+
+        Raises ValueError or TypeError, in one line naming the argument, and the first row of `prim` that is
+        no triangle.
+
+        >>> origins = scene.spawn(np.arange(len(scene)), (1 / 3, 1 / 3), inwards)
+        >>> thickness = scene.intersect(origins, inwards).t
+        """
+        origins: Floats = spawn_from(self.vertices, self._faces, prim, uv, directions, self.accuracy)
+        return origins
 
     def refit(self, vertices: ArrayLike) -> None:
         """Move the vertices: new positions, the same faces.

@@ -223,12 +223,36 @@ def rays(
 
 def directions(value: ArrayLike, count: int, real: Real = FLOAT32) -> Floats:
     """The directions of `count` rays, (count,3) of `real`'s dtype, C-contiguous unless all rays share one."""
-    rows = value if _is_ready(value, real.dtype) else vectors("directions", value, real)
+    return per_hit("directions", value, 3, count, real)
+
+
+def per_hit(name: str, value: ArrayLike, columns: int, count: int, real: Real) -> Floats:
+    """A vector of so many numbers per hit or triangle, (count,columns), C-contiguous unless all share one."""
+    if columns == 3 and _is_ready(value, real.dtype):
+        rows: Floats = value
+    else:
+        rows = vectors(name, value, real, columns=columns)
     if rows.ndim == 1:
-        return np.broadcast_to(rows, (count, 3))
+        return np.broadcast_to(rows, (count, columns))
     if len(rows) != count:
-        raise ValueError(f"directions must have shape ({count}, 3), one per hit, or (3,), got {rows.shape}")
+        raise ValueError(
+            f"{name} must have shape ({count}, {columns}), one per hit, or ({columns},), got {rows.shape}"
+        )
     return rows
+
+
+def triangles(name: str, value: ArrayLike, count: int) -> Int32:
+    """Rows (n,) of `count` faces, or -1 for none."""
+    array = _numeric(name, value, "an (n,) array of integers", "iu", "round them to integer indices")
+    if array.ndim != 1:
+        raise ValueError(f"{name} must have shape (n,), one triangle per ray, got {array.shape}")
+    if array.size and (array.min() < -1 or array.max() >= count):
+        row = int(np.argmax((array < -1) | (array >= count)))
+        raise ValueError(
+            f"{name} must be rows of the {count} faces from 0, or -1 for none, "
+            f"got {name}[{row}] = {array[row]}"
+        )
+    return array.astype(np.int32, copy=False)
 
 
 def threads(value: int | None) -> int:
@@ -290,14 +314,17 @@ def lanes(value: object) -> Lanes | None:
     return 8 if value == 8 else 1
 
 
-def vectors(name: str, value: ArrayLike, real: Real, may_be_one: bool = True) -> Floats:
-    """Vectors (n,3), or one (3,) that all rays share if it `may_be_one`, of `real`'s dtype, C-contiguous."""
-    array = _numeric(name, value, "an (n, 3) array of real numbers", "fiu", masked=True)
+def vectors(name: str, value: ArrayLike, real: Real, may_be_one: bool = True, columns: int = 3) -> Floats:
+    """Vectors (n,3), or one (3,) that all rays share if it `may_be_one`, of `real`'s dtype, C-contiguous.
+
+    `columns` is how many numbers a vector has, if not three.
+    """
+    array = _numeric(name, value, f"an (n, {columns}) array of real numbers", "fiu", masked=True)
     if array.shape == (0,):
-        return real.array(array.reshape(0, 3))
-    if array.ndim not in (1 if may_be_one else 2, 2) or array.shape[-1] != 3:
-        one = ", or (3,) if all rays share it" if may_be_one else ""
-        raise ValueError(f"{name} must have shape (n, 3){one}, got {array.shape}")
+        return real.array(array.reshape(0, columns))
+    if array.ndim not in (1 if may_be_one else 2, 2) or array.shape[-1] != columns:
+        one = f", or ({columns},) if all rays share it" if may_be_one else ""
+        raise ValueError(f"{name} must have shape (n, {columns}){one}, got {array.shape}")
     return _missing_if_masked(value, array, real)
 
 

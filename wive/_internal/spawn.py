@@ -4,14 +4,16 @@ The arithmetic is in cpu/core/spawn.inc, which the core and the Warp kernels com
 """
 
 from collections.abc import Mapping
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from wive import _cpu
+from wive._internal import arguments
 from wive._internal.error_bounds import UNIT_ROUNDOFF
-from wive._internal.precision import Floats
+from wive._internal.host_arrays import host_arrays
+from wive._internal.precision import Floats, real_of
 
 FLOAT_ROUNDOFF = 2.0**-24
 # The fast test: |a x b| with every term taken positive is at most 2/sqrt(3) |a||b|.
@@ -81,3 +83,20 @@ def spawn_origins(
         ACCURACIES.index(accuracy),
         ROUNDINGS[vertices.dtype.name],
     )
+
+
+def spawn_from(
+    vertices: Floats,
+    faces: NDArray[np.int32],
+    prim: ArrayLike,
+    uv: ArrayLike,
+    directions: ArrayLike,
+    accuracy: str,
+) -> Any:
+    """`Scene.spawn`: the same from places of the user's, checked; in the library that they came in."""
+    (prims, weights, along), library = host_arrays("spawn", prim=prim, uv=uv, directions=directions)
+    triangles = arguments.triangles("prim", prims, len(faces))
+    real, count = real_of(vertices.dtype, accuracy), len(triangles)
+    rows = arguments.per_hit("uv", weights, 2, count, real)
+    ways = arguments.per_hit("directions", along, 3, count, real)
+    return library.from_numpy(spawn_origins(vertices, faces, triangles, rows, ways, accuracy))
