@@ -1,0 +1,57 @@
+"""The programs in `examples` that start rays at surfaces find what is known of simple shapes."""
+
+import importlib.util
+import sys
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+import pytest
+from support.meshes import sphere
+
+import wive
+
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
+
+
+def example(name: str) -> ModuleType:
+    found = importlib.util.spec_from_file_location(f"example_{name}", EXAMPLES / f"{name}.py")
+    assert found is not None and found.loader is not None
+    module = importlib.util.module_from_spec(found)
+    found.loader.exec_module(module)
+    return module
+
+
+@pytest.fixture
+def shell() -> tuple[np.ndarray, np.ndarray]:
+    """A hollow sphere of radius 1 whose wall is a tenth thick."""
+    vertices, faces = sphere(4)
+    return np.concatenate([vertices, 0.9 * vertices]), np.concatenate([faces, faces[:, ::-1] + len(vertices)])
+
+
+def test_a_shell_is_as_thick_as_its_wall(shell: tuple[np.ndarray, np.ndarray]) -> None:
+    found, areas = example("thickness").thickness(wive.Scene(*shell))
+    assert (abs(found - 0.1) < 2e-3).all()
+    assert areas.sum() == pytest.approx(4 * np.pi * (1 + 0.81), rel=0.01)
+
+
+def test_a_shell_is_open_outside_and_closed_inside(shell: tuple[np.ndarray, np.ndarray]) -> None:
+    openness = example("openness").openness
+    found = openness(wive.Scene(*shell), rays=4)
+    half = len(found) // 2
+    assert (found[:half] == 1).all() and (found[half:] == 0).all()
+    assert (openness(wive.Scene(*shell), rays=4, reach=0.01) > 0.5).mean() > 0.9
+
+
+def test_the_programs_run(
+    shell: tuple[np.ndarray, np.ndarray],
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    np.savez(tmp_path / "shell.npz", vertices=shell[0], faces=shell[1])
+    for name in ("thickness", "openness"):
+        monkeypatch.setattr(sys, "argv", [name, str(tmp_path / "shell.npz")])
+        example(name).main()
+    assert "least 0.099" in (text := capsys.readouterr().out) and "100.0% of the surface" in text
+    assert np.load(tmp_path / "shell.openness.npy").shape == (len(shell[1]),)
