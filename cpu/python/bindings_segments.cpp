@@ -9,6 +9,7 @@ namespace wive {
 namespace {
 
 // clang-format off
+#include "core/number.inc"
 #include "core/double3.inc"
 #include "core/separation.inc"
 // clang-format on

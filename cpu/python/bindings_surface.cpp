@@ -1,9 +1,8 @@
-// Points, normals, error bounds and spawned origins of hits, computed anew by each call.
+// Points, normals and error bounds of hits, computed anew by each call.
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
-#include <type_traits>
 
 #include "python/bindings.h"
 #include "python/each_hit.h"
@@ -13,14 +12,10 @@ namespace wive {
 namespace {
 
 // clang-format off
+#include "core/number.inc"
 #include "core/double3.inc"
 #include "core/error_bound.inc"
-#include "core/spawn.inc"
 // clang-format on
-
-static_assert(SpawnOrigin::fast == static_cast<int>(Accuracy::fast) &&
-              SpawnOrigin::watertight == static_cast<int>(Accuracy::watertight) &&
-              SpawnOrigin::exact == static_cast<int>(Accuracy::exact));
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 
@@ -131,28 +126,6 @@ py::array_t<double> error_bounds(const Array<Real>& vertices, const Array<std::i
     return answer;
 }
 
-// accuracy: as SpawnOrigin numbers them; constants: the members of SpawnOrigin from point_error on.
-template <class Real>
-py::array_t<Real> spawn_origins(const Array<Real>& vertices, const Array<std::int32_t>& faces,
-                                const Array<std::int32_t>& prim, const Array<Real>& uv, const Array<Real>& directions,
-                                int accuracy, const std::array<double, 8>& constants) {
-    expect_rows(uv, 2, prim, "uv: expected shape (n, 2), n as prim has");
-    expect_rows(directions, 3, prim, "directions: expected shape (n, 3), n as prim has");
-    const auto [point, normal, corner_error, weights_error, fast, step, least, margin] = constants;
-    const SpawnOrigin spawn = {
-        accuracy, std::is_same_v<Real, float>, point, normal, corner_error, weights_error, fast, step, least, margin};
-    const Real *weights = uv.data(), *along = directions.data();
-    auto answer = make_rows<Real>(prim.size());
-    Real* out = answer.mutable_data();
-    for_each_hit(vertices, faces, prim, [=](std::size_t i, TriangleCorners corner) {
-        const double direction[3] = {along[3 * i], along[3 * i + 1], along[3 * i + 2]};
-        double origin[3] = {nan, nan, nan};
-        if (corner) spawn.write(corner, weights[2 * i], weights[2 * i + 1], direction, origin);
-        for (int axis = 0; axis < 3; ++axis) out[3 * i + axis] = static_cast<Real>(origin[axis]);
-    });
-    return answer;
-}
-
 }  // namespace
 
 void bind_surface(py::module_& m) {
@@ -165,8 +138,6 @@ void bind_surface(py::module_& m) {
         m.def("surface_normals", &normals<Real>, array_arg("vertices"), array_arg("faces"), array_arg("prim"));
         m.def("error_bounds", &error_bounds<Real>, array_arg("vertices"), array_arg("faces"), array_arg("prim"),
               array_arg("t"), array_arg("origins"), array_arg("directions"), py::arg("constants"));
-        m.def("spawn_origins", &spawn_origins<Real>, array_arg("vertices"), array_arg("faces"), array_arg("prim"),
-              array_arg("uv"), array_arg("directions"), py::arg("accuracy"), py::arg("constants"));
     });
 }
 

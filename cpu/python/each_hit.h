@@ -20,30 +20,58 @@ std::size_t load_index(const Index* from) {
     return static_cast<std::size_t>(static_cast<std::make_unsigned_t<Index>>(__atomic_load_n(from, __ATOMIC_RELAXED)));
 }
 
-// Calls row(i, corners of the triangle of hit i, in double) on so many threads (0 is every core), with the interpreter
-// lock released. The corners of a miss are null.
+// The triangles of hits: rows of `faces`, or none.
+template <class Real>
+class HitTriangles {
+public:
+    HitTriangles(const Array<Real>& vertices, const Array<std::int32_t>& faces, const Array<std::int32_t>& prim)
+        : points_(vertices.data()), corners_(faces.data()), prims_(prim.data()), size_(to_size(prim.size())) {
+        expect_shape(vertices, 3, "vertices: expected shape (v, 3)");
+        expect_shape(faces, 3, "faces: expected shape (f, 3)");
+        face_count_ = to_size(faces.shape(0));
+        point_count_ = to_size(vertices.shape(0));
+    }
+    std::size_t size() const { return size_; }
+
+    // Calls set(k, axis, coordinate) for the corners of the triangle of hit i; false if there is no such triangle.
+    template <class Set>
+    bool load(std::size_t i, const Set& set) const {
+        const auto face = load_index(prims_ + i);
+        if (face >= face_count_) return false;
+        for (std::size_t k = 0; k < 3; ++k) {
+            const auto vertex = load_index(corners_ + 3 * face + k);
+            if (vertex >= point_count_) return false;
+            for (std::size_t axis = 0; axis < 3; ++axis) set(k, axis, points_[3 * vertex + axis]);
+        }
+        return true;
+    }
+
+    // Calls work(begin, end) for chunks of the hits, on so many threads (0 is every core), with the interpreter lock
+    // released.
+    template <class Work>
+    void for_each_chunk(unsigned requested_threads, const Work& work) const {
+        const Released released;
+        Threads threads(size_ > hits_per_chunk ? thread_count(requested_threads) : 1);
+        parallel_chunks(size_, hits_per_chunk, threads, work);
+    }
+
+private:
+    static std::size_t to_size(py::ssize_t size) { return static_cast<std::size_t>(size); }
+
+    const Real* points_;
+    const std::int32_t *corners_, *prims_;
+    std::size_t size_, face_count_ = 0, point_count_ = 0;
+};
+
+// Calls row(i, corners of the triangle of hit i, in double), as for_each_chunk does. The corners of a miss are null.
 template <class Real, class Row>
 void for_each_hit(const Array<Real>& vertices, const Array<std::int32_t>& faces, const Array<std::int32_t>& prim,
-                  const Row& row, unsigned requested_threads = 0) {
-    expect_shape(vertices, 3, "vertices: expected shape (v, 3)");
-    expect_shape(faces, 3, "faces: expected shape (f, 3)");
-    const std::int32_t *prims = prim.data(), *corners = faces.data();
-    const Real* points = vertices.data();
-    const auto face_count = static_cast<std::size_t>(faces.shape(0)),
-               point_count = static_cast<std::size_t>(vertices.shape(0));
-    const auto hits = static_cast<std::size_t>(prim.size());
-    const Released released;
-    Threads threads(hits > hits_per_chunk ? thread_count(requested_threads) : 1);
-    parallel_chunks(hits, hits_per_chunk, threads, [&](std::size_t begin, std::size_t end) {
+                  const Row& row, unsigned threads = 0) {
+    const HitTriangles<Real> triangles(vertices, faces, prim);
+    triangles.for_each_chunk(threads, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) {
-            const auto face = load_index(prims + i);
             double corner[3][3];
-            bool known = face < face_count;
-            for (std::size_t k = 0; known && k < 3; ++k) {
-                const auto vertex = load_index(corners + 3 * face + k);
-                known = vertex < point_count;
-                for (std::size_t axis = 0; known && axis < 3; ++axis) corner[k][axis] = points[3 * vertex + axis];
-            }
+            const bool known = triangles.load(i, [&](std::size_t k, std::size_t axis, Real x) { corner[k][axis] = x; });
             row(i, known ? corner : nullptr);
         }
     });

@@ -49,7 +49,7 @@ def bound_of(
     const SpawnOrigin spawn = {accuracy, is_float, constants[0], constants[1], constants[2], constants[3],
                                constants[4], constants[5], constants[6], constants[7]};
     wp::vec_t<3, wp::float64> origin;
-    spawn.write(corners.data, u, v, &direction[0], &origin[0]);
+    SpawnStore::write(spawn, corners.data, u, v, &direction[0], &origin[0]);
     return origin;
 """
 )
@@ -62,7 +62,7 @@ def origin_of(
     is_float: bool,
     constants: SpawnConstants,
 ) -> wp.vec3d:
-    """SpawnOrigin::write of cpu/core/spawn.inc; corners as rows."""
+    """SpawnStore::write of cpu/core/spawn_store.inc; corners as rows."""
     ...
 
 
