@@ -1,6 +1,6 @@
 """Origins from which a ray can't hit the triangle that it leaves: docs/accuracy.md, "Spawned rays".
 
-The arithmetic is in cpu/core/spawn.inc, which the core and the Warp kernels compile.
+The arithmetic is in cpu/core/spawn.inc and spawn_store.inc, which the core and the Warp kernels compile.
 """
 
 from collections.abc import Mapping
