@@ -340,8 +340,9 @@ class Scene:
         infinite, masked or beyond 1e18 is seen by none. `visible(b, a)` is the same.
 
         Arguments:
-            a, b: (n,3) real numbers, or (3,) for all; torch, Warp and DLPack arrays in host memory give an
-                array of their library. Points are not rounded to the scene's precision, their rays are.
+            a, b: (n,3) real numbers, or of another leading shape, or (3,) for all; torch, Warp and DLPack
+                arrays in host memory give an array of their library. Points are not rounded to the scene's
+                precision, their rays are.
             threads: how many to use; None is every core. For CPU backends.
 
         Raises ValueError or TypeError, in one line naming the argument.
@@ -359,8 +360,8 @@ class Scene:
         A ray from there along its direction, with tmin = 0, doesn't hit the triangle that it leaves.
 
         Arguments:
-            prim: (n,) integers, rows of `faces`; -1 for no triangle, and a zero-area one, give NaN, and rays
-                from there miss.
+            prim: (n,) integers, or of another leading shape, rows of `faces`; -1 for no triangle, and a
+                zero-area one, give NaN, and rays from there miss.
             uv: (n,2) real numbers, or (2,) for all: the point is (1-u-v) v0 + u v1 + v v2, for example
                 (1/3, 1/3) for the middle of each triangle.
             directions: (n,3) real numbers, or (3,) for all; of any length.

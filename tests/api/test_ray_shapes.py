@@ -265,3 +265,45 @@ def test_spawned_directions_have_the_shape_of_the_hits(shape):
     with pytest.raises(ValueError) as error:
         hits.spawn(np.ones(shape))
     assert str(error.value) == f"directions must have shape (4, 5, 3), one per hit, or (3,), got {shape}"
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_lines_of_sight_have_the_shape_of_their_ends(backend, dtype):
+    scene = scene_of(dtype, backend=backend)
+    a, b = rays((6, 4), dtype)
+    found = scene.visible(a, b)
+    assert found.shape == (6, 4)
+    assert 0 < np.count_nonzero(found) < COUNT
+    np.testing.assert_array_equal(found.ravel(), scene.visible(a.reshape(-1, 3), b.reshape(-1, 3)))
+    np.testing.assert_array_equal(scene.visible(a[0, 0], b).ravel(), scene.visible(a[0, 0], b.reshape(-1, 3)))
+    np.testing.assert_array_equal(scene.visible(a.tolist(), np.asfortranarray(b)), found)
+    np.testing.assert_array_equal(scene.visible(Foreign.Array(a), Foreign.Array(b)).values, found)
+    picture = scene.intersect(*wive.Camera((0, 0, 4), (0, 0, 0)).rays(8, 6, dtype))
+    np.testing.assert_array_equal(scene.visible((0, 0, 4), picture.points()), picture.mask)
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_places_to_spawn_from_have_any_shape(dtype):
+    scene = scene_of(dtype)
+    prim = np.arange(COUNT, dtype=np.int32)
+    uv = np.random.default_rng(1).uniform(0, 0.5, (COUNT, 2)).astype(dtype)
+    directions = rays((COUNT,), dtype)[1]
+    expected = scene.spawn(prim, uv, directions).reshape(6, 4, 3)
+    shaped = prim.reshape(6, 4), uv.reshape(6, 4, 2), directions.reshape(6, 4, 3)
+    np.testing.assert_array_equal(scene.spawn(*shaped), expected)
+    np.testing.assert_array_equal(scene.spawn(*(array.tolist() for array in shaped)), expected)
+    np.testing.assert_array_equal(scene.spawn(*map(Foreign.Array, shaped)).values, expected)
+    one = scene.spawn(shaped[0], (0.25, 0.25), (0, 0, 1))
+    np.testing.assert_array_equal(one, scene.spawn(prim, (0.25, 0.25), (0, 0, 1)).reshape(6, 4, 3))
+
+
+def test_ends_and_places_whose_shapes_do_not_fit_are_refused():
+    scene = scene_of()
+    with pytest.raises(ValueError, match=r"^a and b must have one shape, or one of them \(3,\) if"):
+        scene.visible(PICTURE, PICTURE[0])
+    with pytest.raises(ValueError, match=r"^b must have shape \(\.\.\., 3\), one vector per segment, got"):
+        scene.visible(PICTURE, np.zeros((4, 5)))
+    with pytest.raises(ValueError, match=r"^uv must have shape \(4, 5, 2\), one row per prim, or"):
+        scene.spawn(np.zeros((4, 5), int), np.zeros((20, 2)), PICTURE)
+    with pytest.raises(ValueError, match=r"^directions must have shape \(4, 5, 3\), one row per prim, or"):
+        scene.spawn(np.zeros((4, 5), int), (0.2, 0.2), PICTURE[0])

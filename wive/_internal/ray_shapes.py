@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ from wive._internal import arguments
 from wive._internal.arrays import NUMPY, Library
 from wive._internal.rays import NAMES, Rays
 from wive._internal.room import expect_room
-from wive._internal.shapes import Shape, reshaped, shape_of
+from wive._internal.shapes import Shape, has_many_axes, reshaped, shape_of
 
 # The axes at the end of origins, directions, tmin and tmax that hold one ray's numbers.
 OF_ONE_RAY: tuple[Shape, ...] = ((3,), (3,), (), ())
@@ -26,16 +27,7 @@ def flat_rays(rays: Rays) -> tuple[Rays, Shape]:
     given = list(zip(NAMES, rays[:4], rays.libraries, strict=True))
     arrays = [_array(*one) for one in given]
     shapes = [shape_of(name, array, library) for (name, _, library), array in zip(given, arrays, strict=True)]
-    for name, shape in zip(NAMES[:2], shapes[:2], strict=True):
-        if shape[-1:] != (3,):
-            raise ValueError(f"{name} must have shape (..., 3), one vector per ray, got {shape}")
-    one, other = shapes[:2]
-    if one != other and (3,) not in (one, other):
-        raise ValueError(
-            "origins and directions must have one shape, or one of them (3,) if all rays share it, "
-            f"got {one} and {other}"
-        )
-    leading = max(one, other, key=len)[:-1]
+    leading = _leading_of(NAMES[:2], shapes[:2], "rays")
     for name, shape in zip(NAMES[2:], shapes[2:], strict=True):
         if shape not in ((), leading):
             raise ValueError(
@@ -48,6 +40,35 @@ def flat_rays(rays: Rays) -> tuple[Rays, Shape]:
     return Rays(origins, directions, tmin, tmax, rays.library, rays.libraries), leading
 
 
+def flat_ends(a: Any, b: Any) -> tuple[Any, Any, Shape | None]:
+    """Ends of segments in NumPy's arrays as (n,3), or (3,) for all, and their leading shape; None if flat."""
+    if not (has_many_axes(a, NUMPY) or has_many_axes(b, NUMPY)):
+        return a, b, None
+    first, second = _array("a", a, NUMPY), _array("b", b, NUMPY)
+    leading = _leading_of(("a", "b"), (np.shape(first), np.shape(second)), "segments")
+    one, other = (_flattened(end, NUMPY, np.shape(end), (3,)) for end in (first, second))
+    return one, other, leading
+
+
+def flat_places(prim: Any, uv: Any, directions: Any) -> tuple[Any, Any, Any, Shape | None]:
+    """Triangles (n,), uv (n,2) and directions (n,3) in NumPy's arrays, and their leading shape; None if flat.
+
+    One uv (2,) and one direction (3,) stay. Raises ValueError for shapes that don't fit together.
+    """
+    if not has_many_axes([prim], NUMPY):
+        return prim, uv, directions, None
+    prims = _array("prim", prim, NUMPY)
+    leading = np.shape(prims)
+    rows = []
+    for name, value, tail in (("uv", uv, (2,)), ("directions", directions, (3,))):
+        array = _array(name, value, NUMPY)
+        shape, expected = np.shape(array), (*leading, *tail)
+        if shape not in (tail, expected):
+            raise ValueError(f"{name} must have shape {expected}, one row per prim, or {tail}, got {shape}")
+        rows.append(_flattened(array, NUMPY, shape, tail))
+    return _flattened(prims, NUMPY, leading, ()), rows[0], rows[1], leading
+
+
 def flat_directions(value: Any, library: Library, leading: Shape) -> Any:
     """Directions (*leading, 3) as (n,3); (3,) stays. Raises ValueError for any other shape."""
     array = _array("directions", value, library)
@@ -55,6 +76,20 @@ def flat_directions(value: Any, library: Library, leading: Shape) -> Any:
     if shape not in ((3,), (*leading, 3)):
         raise ValueError(f"directions must have shape {(*leading, 3)}, one per hit, or (3,), got {shape}")
     return _flattened(array, library, shape, (3,))
+
+
+def _leading_of(names: Sequence[str], shapes: Sequence[Shape], what: str) -> Shape:
+    """The leading shape of two arrays of vectors, which is one, or one of them is (3,)."""
+    for name, shape in zip(names, shapes, strict=True):
+        if shape[-1:] != (3,):
+            raise ValueError(f"{name} must have shape (..., 3), one vector per {what[:-1]}, got {shape}")
+    one, other = shapes
+    if one != other and (3,) not in (one, other):
+        raise ValueError(
+            f"{names[0]} and {names[1]} must have one shape, or one of them (3,) if all {what} share it, "
+            f"got {one} and {other}"
+        )
+    return max(one, other, key=len)[:-1]
 
 
 def _array(name: str, value: Any, library: Library) -> Any:

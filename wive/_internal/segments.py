@@ -18,7 +18,9 @@ from wive._internal.distant import MOST_COORDINATE
 from wive._internal.error_bounds import ROUNDINGS, UNIT_ROUNDOFF
 from wive._internal.host_arrays import host_arrays
 from wive._internal.precision import FLOAT64, Floats
+from wive._internal.ray_shapes import flat_ends
 from wive._internal.rays import ALL_NUMPY, Rays
+from wive._internal.shapes import Leading
 from wive._internal.tracer import Tracer
 
 # A point on a triangle is w0 v0 + w1 v1 + w2 v2. Computed in the precision of the scene, its coordinates are
@@ -50,6 +52,7 @@ class Ends(NamedTuple):
 def visible(tracer: Tracer, faces: NDArray[np.int32], a: ArrayLike, b: ArrayLike, work: Work) -> Any:
     """(n,) bool in the library that `a` and `b` came in: whether nothing is between them."""
     (first, second), library = host_arrays("visible", a=a, b=b)
+    first, second, leading = flat_ends(first, second)
     mesh, work = (tracer.bvh.vertices, faces), work._replace(touching=True)
     ends = _ends("a", first, mesh[0]), _ends("b", second, mesh[0])
     count = _count(*(len(end.rows) for end in ends))
@@ -62,7 +65,8 @@ def visible(tracer: Tracer, faces: NDArray[np.int32], a: ArrayLike, b: ArrayLike
         rows = ends[0].part(begin, end), ends[1].part(begin, end)
         part = free[begin:end]
         part &= ~_blocked(tracer, mesh, rows, (ends[0].error, ends[1].error), center, work)
-    return library.from_numpy(free)
+    answer = library.from_numpy(free)
+    return answer if leading is None else Leading(library, leading)(answer)
 
 
 def _ends(name: str, value: ArrayLike, vertices: Floats) -> Ends:

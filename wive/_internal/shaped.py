@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any
 
 from numpy.typing import ArrayLike
 
 from wive._internal.arguments import Work
-from wive._internal.arrays import Library, library_of
+from wive._internal.arrays import library_of
 from wive._internal.precision import Floats
 from wive._internal.ray_shapes import flat_directions, flat_rays
 from wive._internal.rays import Rays
-from wive._internal.shapes import Shape, reshaped, shape_of
+from wive._internal.shapes import Leading
 from wive._internal.wrapping import Wrapping
 from wive.all_hits import AllHits
 from wive.hits import Hits, Stats, WrappedHits
@@ -34,19 +33,6 @@ def query_shaped(
     if isinstance(answer, Hits):
         return ShapedHits(answer, shape), counters
     return answer if isinstance(answer, AllHits) else shape(answer), counters
-
-
-@dataclass(frozen=True)
-class Leading:
-    """A library's arrays of n rays in the shape that the rays had."""
-
-    library: Library
-    shape: Shape
-
-    def __call__(self, array: Any) -> Any:
-        """An array (n,...) with the leading shape in place of n."""
-        tail = shape_of("results", array, self.library)[1:]
-        return reshaped(array, self.library, (*self.shape, *tail))
 
 
 class ShapedHits(WrappedHits):

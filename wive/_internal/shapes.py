@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -48,6 +49,19 @@ def reshaped(value: Any, library: Library, shape: Shape) -> Any:
     if hasattr(value, "__dlpack__"):
         return library.from_numpy(library.to_numpy(value).reshape(shape))
     return _ReshapedInterface(value, shape)
+
+
+@dataclass(frozen=True)
+class Leading:
+    """A library's arrays of n rays in the shape that the rays had."""
+
+    library: Library
+    shape: Shape
+
+    def __call__(self, array: Any) -> Any:
+        """An array (n,...) with the leading shape in place of n."""
+        tail = shape_of("results", array, self.library)[1:]
+        return reshaped(array, self.library, (*self.shape, *tail))
 
 
 class _ReshapedInterface:

@@ -14,6 +14,8 @@ from wive._internal import arguments
 from wive._internal.error_bounds import UNIT_ROUNDOFF
 from wive._internal.host_arrays import host_arrays
 from wive._internal.precision import Floats, real_of
+from wive._internal.ray_shapes import flat_places
+from wive._internal.shapes import Leading
 
 FLOAT_ROUNDOFF = 2.0**-24
 # The fast test: |a x b| with every term taken positive is at most 2/sqrt(3) |a||b|.
@@ -95,8 +97,10 @@ def spawn_from(
 ) -> Any:
     """`Scene.spawn`: the same from places of the user's, checked; in the library that they came in."""
     (prims, weights, along), library = host_arrays("spawn", prim=prim, uv=uv, directions=directions)
+    prims, weights, along, leading = flat_places(prims, weights, along)
     triangles = arguments.triangles("prim", prims, len(faces))
     real, count = real_of(vertices.dtype, accuracy), len(triangles)
     rows = arguments.per_hit("uv", weights, 2, count, real)
     ways = arguments.per_hit("directions", along, 3, count, real)
-    return library.from_numpy(spawn_origins(vertices, faces, triangles, rows, ways, accuracy))
+    origins = library.from_numpy(spawn_origins(vertices, faces, triangles, rows, ways, accuracy))
+    return origins if leading is None else Leading(library, leading)(origins)
