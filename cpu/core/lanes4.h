@@ -13,6 +13,13 @@ struct Lanes4 {
 
 #define WIVE_LANES [[gnu::always_inline]] inline
     Lanes4() = default;
+    // Copied by a constructor, so that all functions pass it in memory: those for AVX have registers that others lack.
+    WIVE_LANES Lanes4(const Lanes4& other) : lanes(other.lanes) {}
+    WIVE_LANES Lanes4& operator=(const Lanes4& other) {
+        lanes = other.lanes;
+        return *this;
+    }
+    ~Lanes4() = default;
     WIVE_LANES explicit Lanes4(const Doubles& values) : lanes(values) {}
     WIVE_LANES Lanes4(double x) : lanes{x, x, x, x} {}
     WIVE_LANES static Lanes4 load(const double* from) { return Lanes4(*reinterpret_cast<const Doubles*>(from)); }
