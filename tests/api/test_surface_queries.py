@@ -75,7 +75,6 @@ BAD_PLACES = [
     ([-2], [0, 0], [0, 0, 1], "prim must be rows of the 1 faces from 0, or -1 for none, got prim[0] = -2"),
     (np.array([2**40]), [0, 0], [0, 0, 1], "got prim[0] = 1099511627776"),
     (0, [0, 0], [0, 0, 1], "prim must have shape (n,), one triangle per ray, got ()"),
-    ([[0]], [0, 0], [0, 0, 1], "prim must have shape (n,), one triangle per ray, got (1, 1)"),
     ([0.0], [0, 0], [0, 0, 1], "prim must be an (n,) array of integers, got dtype float64"),
     ([True], [0, 0], [0, 0, 1], "prim must be an (n,) array of integers, got dtype bool"),
     (np.ma.masked_array([0], [True]), [0, 0], [0, 0, 1], "array of integers, got 1 that are masked"),
