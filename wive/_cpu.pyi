@@ -194,6 +194,18 @@ class Bvh:
         touching: bool = False,
     ) -> tuple[NDArray[np.int32], NDArray[np.int32] | None]:
         """How many hits each ray has in [tmin, tmax]: (n,) int32, and stats (n,3) or None."""
+    def intersect_ready(
+        self, kernel: Kernels, origins: object, directions: object, tmin: object, tmax: object
+    ) -> tuple[NDArray[Any], NDArray[np.int32], NDArray[Any], None] | None:
+        """`intersect`, if the arrays need neither conversion nor copying and limits are floats; else None."""
+    def occluded_ready(
+        self, kernel: Kernels, origins: object, directions: object, tmin: object, tmax: object
+    ) -> tuple[NDArray[np.bool_], None] | None:
+        """`occluded`, in the same way."""
+    def count_ready(
+        self, kernel: Kernels, origins: object, directions: object, tmin: object, tmax: object
+    ) -> tuple[NDArray[np.int32], None] | None:
+        """`count`, in the same way."""
     def render_rows(
         self,
         kernel: Kernels | str,

@@ -86,8 +86,18 @@ class Hits(ReadOnly):
         moved: Moved | None = None,
     ) -> None:
         """Keep the arrays; a scene adds its rays and accuracy, for `error_bound` and `spawn`."""
-        vars(self).update(t=t, prim=prim, uv=uv, vertices=vertices, faces=faces)
-        vars(self).update(_rays=rays, _accuracy=accuracy, _moved=moved)
+        # In one step: making hits is a tenth of a query of one ray.
+        attributes = {
+            "t": t,
+            "prim": prim,
+            "uv": uv,
+            "vertices": vertices,
+            "faces": faces,
+            "_rays": rays,
+            "_accuracy": accuracy,
+            "_moved": moved,
+        }
+        object.__setattr__(self, "__dict__", attributes)
 
     @property
     def mask(self) -> NDArray[np.bool_]:

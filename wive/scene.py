@@ -488,13 +488,16 @@ class Scene:
     ) -> Answer | tuple[Answer, Stats]:
         """Check a query's arguments; its answer, with the counters if `stats`."""
         tracer = self._tracer
-        checked = check_rays(*rays, tracer.backend, tracer.device)
         usual = threads is None and in_flight is None and stats is False and touching is False
         if usual and max_bytes is None and type(lanes) is str and lanes == "auto":
+            at_once: Answer | None = tracer.at_once(query.__name__, *rays)
+            if at_once is not None:
+                return at_once
             work = USUAL_WORK
         else:
             options = threads, in_flight, lanes, stats, touching, max_bytes
             work = arguments.work(tracer.backend, tracer.lacks, *options)
+        checked = check_rays(*rays, tracer.backend, tracer.device)
         answer, counters = query(checked, work) if checked.is_flat else query_shaped(query, checked, work)
         return answer if counters is None else (answer, counters)
 

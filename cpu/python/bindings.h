@@ -28,6 +28,23 @@ using Array = py::array_t<T, py::array::c_style>;
 // An array argument that is not converted: it must have the dtype and the layout.
 inline py::arg array_arg(const char* name) { return py::arg(name).noconvert(); }
 
+// An array argument as queries take it. pybind11's own makes two arrays for each argument, which takes longer than
+// tracing one ray: an empty one to begin with, and a new one of the argument.
+template <class T>
+struct GivenArray {
+    Array<T> array;
+};
+
+// A new array, not filled. pybind11's own way takes as long as tracing one ray.
+template <class T, std::size_t axes>
+Array<T> new_array(const py::ssize_t (&shape)[axes]) {
+    const auto& numpy = py::detail::npy_api::get();
+    PyObject* array = numpy.PyArray_NewFromDescr_(numpy.PyArray_Type_, py::dtype::of<T>().release().ptr(),
+                                                  static_cast<int>(axes), shape, nullptr, nullptr, 0, nullptr);
+    if (!array) throw py::error_already_set();
+    return py::reinterpret_steal<Array<T>>(array);
+}
+
 inline void expect(bool condition, const char* message) {
     if (!condition) throw std::invalid_argument(message);
 }
@@ -146,3 +163,21 @@ void bind_spawn(py::module_& m);
 void bind_segments(py::module_& m);
 
 }  // namespace wive
+
+template <class T>
+struct pybind11::detail::type_caster<wive::GivenArray<T>> {
+    static constexpr auto name = handle_type_name<wive::Array<T>>::name;
+    template <class>
+    using cast_op_type = wive::GivenArray<T>;
+
+    // Never converts: the array must have the dtype and the layout.
+    bool load(handle source, bool) {
+        if (!wive::Array<T>::check_(source)) return false;
+        source_ = source;
+        return true;
+    }
+    operator wive::GivenArray<T>() const { return {reinterpret_borrow<wive::Array<T>>(source_)}; }
+
+private:
+    handle source_;  // alive until the call returns
+};

@@ -50,7 +50,7 @@ class StepCounts {
 public:
     template <class Real>
     explicit StepCounts(const QueryCall<Real>& call) {
-        if (call.stats) array_.emplace(std::vector<py::ssize_t>{call.count, 3});
+        if (call.stats) array_.emplace(new_array<std::int32_t>({call.count, 3}));
     }
     std::int32_t* data() { return array_ ? array_->mutable_data() : nullptr; }
     std::optional<Array<std::int32_t>> take() { return std::move(array_); }
@@ -71,8 +71,8 @@ void trace_released(const QueryCall<Real>& call, QueryKind query, const HitBatch
 template <class Real>
 py::tuple intersect(const QueryCall<Real>& call) {
     call.expect_room(3 * sizeof(Real) + sizeof(std::int32_t));
-    Array<Real> t(call.count), uv({call.count, py::ssize_t{2}});
-    Array<std::int32_t> prim(call.count);
+    auto t = new_array<Real>({call.count}), uv = new_array<Real>({call.count, 2});
+    auto prim = new_array<std::int32_t>({call.count});
     StepCounts steps(call);
     HitBatch<Real> hits;
     hits.t = t.mutable_data();
@@ -86,7 +86,7 @@ py::tuple intersect(const QueryCall<Real>& call) {
 template <class Real>
 py::tuple occluded(const QueryCall<Real>& call) {
     call.expect_room(sizeof(bool));
-    Array<bool> mask(call.count);
+    auto mask = new_array<bool>({call.count});
     StepCounts steps(call);
     HitBatch<Real> hits;
     hits.occluded = mask.mutable_data();
@@ -98,7 +98,7 @@ py::tuple occluded(const QueryCall<Real>& call) {
 template <class Real>
 py::tuple count(const QueryCall<Real>& call) {
     call.expect_room(sizeof(std::int32_t));
-    Array<std::int32_t> counts(call.count);
+    auto counts = new_array<std::int32_t>({call.count});
     StepCounts steps(call);
     HitBatch<Real> hits;
     hits.count = counts.mutable_data();
@@ -111,7 +111,7 @@ py::tuple count(const QueryCall<Real>& call) {
 template <class Real>
 py::tuple intersect_all(const QueryCall<Real>& call) {
     call.expect_room(sizeof(std::int64_t) + sizeof(std::int32_t));
-    Array<std::int64_t> offsets(call.count + 1);
+    auto offsets = new_array<std::int64_t>({call.count + 1});
     StepCounts steps(call);
     const TraceBatch<Real> kernel = call.kernel(QueryKind::all);
     const BvhView bvh = call.tree.bvh().view();
@@ -125,8 +125,8 @@ py::tuple intersect_all(const QueryCall<Real>& call) {
         collector->write_offsets(offsets_data);
     }
     const auto total = static_cast<py::ssize_t>(offsets_data[call.count]);
-    Array<Real> t(total), uv({total, py::ssize_t{2}});
-    Array<std::int32_t> prim(total);
+    auto t = new_array<Real>({total}), uv = new_array<Real>({total, 2});
+    auto prim = new_array<std::int32_t>({total});
     const SortedHits<Real> hits = {offsets_data, t.mutable_data(), prim.mutable_data(), uv.mutable_data()};
     {
         const Released released;
@@ -140,15 +140,61 @@ py::tuple intersect_all(const QueryCall<Real>& call) {
 template <class Real, class... More, class... Arg>
 void define_query(PyBvhClass& bvh, const char* name, py::tuple (*query)(const QueryCall<Real>&), const Arg&... arg) {
     static_assert(sizeof...(More) == sizeof...(Arg));
-    const auto call = [query](const PyBvh& self, const KernelArg& kernel, const Array<Real>& origins,
-                              const Array<Real>& directions, const Array<Real>& tmin, const Array<Real>& tmax,
-                              unsigned threads, unsigned in_flight, bool stats, More... more) {
+    const auto call = [query](const PyBvh& self, const KernelArg& kernel, const GivenArray<Real>& origins,
+                              const GivenArray<Real>& directions, const GivenArray<Real>& tmin,
+                              const GivenArray<Real>& tmax, unsigned threads, unsigned in_flight, bool stats,
+                              More... more) {
         self.expect_precision<Real>();
-        const RayBatch<Real> rays = ray_batch(origins, directions, tmin, tmax);
-        return query({self, table_of<Real>(kernel), rays, origins.shape(0), threads, in_flight, stats, more...});
+        const RayBatch<Real> rays = ray_batch(origins.array, directions.array, tmin.array, tmax.array);
+        return query({self, table_of<Real>(kernel), rays, origins.array.shape(0), threads, in_flight, stats, more...});
     };
-    bvh.def(name, call, py::arg("kernel"), array_arg("origins"), array_arg("directions"), array_arg("tmin"),
-            array_arg("tmax"), py::arg("threads") = 0, py::arg("in_flight") = 0, py::arg("stats") = false, arg...);
+    bvh.def(name, call, py::arg("kernel"), py::arg("origins"), py::arg("directions"), py::arg("tmin"), py::arg("tmax"),
+            py::arg("threads") = 0, py::arg("in_flight") = 0, py::arg("stats") = false, arg...);
+}
+
+// The data of an array (n, 3) that needs neither conversion nor copying, and its rows; null for all other objects.
+template <class Real>
+const Real* ready_rows(py::handle object, py::ssize_t& count) {
+    const auto& numpy = py::detail::npy_api::get();
+    if (Py_TYPE(object.ptr()) != numpy.PyArray_Type_ || !Array<Real>::check_(object)) return nullptr;
+    if (!py::detail::check_flags(object.ptr(), py::detail::npy_api::NPY_ARRAY_ALIGNED_)) return nullptr;
+    const auto& array = *py::detail::array_proxy(object.ptr());
+    if (array.nd != 2 || array.dimensions[1] != 3) return nullptr;
+    count = array.dimensions[0];
+    return reinterpret_cast<const Real*>(array.data);
+}
+
+// Sets a limit given as a Python float that Real holds; false for all other objects.
+template <class Real>
+bool set_limit(py::handle object, Real& limit) {
+    if (!PyFloat_CheckExact(object.ptr())) return false;
+    const double given = PyFloat_AS_DOUBLE(object.ptr());
+    limit = static_cast<Real>(given);
+    return limit == given;
+}
+
+// The query's result but for step counts, or None if an argument is not ready as it is: one ray is traced in less time
+// than its arguments are checked in Python.
+template <class Real>
+py::object query_ready(const PyBvh& self, const PyKernels& kernels, py::handle origins, py::handle directions,
+                       py::handle tmin, py::handle tmax, py::tuple (*query)(const QueryCall<Real>&)) {
+    py::ssize_t count = 0, others = 0;
+    Real low, high;
+    const Real* from = ready_rows<Real>(origins, count);
+    const Real* along = ready_rows<Real>(directions, others);
+    if (!from || !along || count != others || !set_limit(tmin, low) || !set_limit(tmax, high)) return py::none();
+    return query({self, kernels.table<Real>(), {from, along, &low, &high, 0, 0}, count, 0, 0, false});
+}
+
+void define_ready_query(PyBvhClass& bvh, const char* name, py::tuple (*in_floats)(const QueryCall<float>&),
+                        py::tuple (*in_doubles)(const QueryCall<double>&)) {
+    const auto call = [=](const PyBvh& self, const PyKernels& kernels, py::handle origins, py::handle directions,
+                          py::handle tmin, py::handle tmax) {
+        return std::holds_alternative<Array<float>>(self.vertices())
+                   ? query_ready<float>(self, kernels, origins, directions, tmin, tmax, in_floats)
+                   : query_ready<double>(self, kernels, origins, directions, tmin, tmax, in_doubles);
+    };
+    bvh.def(name, call, py::arg("kernel"), py::arg("origins"), py::arg("directions"), py::arg("tmin"), py::arg("tmax"));
 }
 
 }  // namespace
@@ -161,6 +207,9 @@ void bind_queries(PyBvhClass& bvh) {
                                               py::arg("max_bytes") = 0);
         define_query<Real, bool>(bvh, "count", count, py::arg("touching") = false);
     });
+    define_ready_query(bvh, "intersect_ready", intersect, intersect);
+    define_ready_query(bvh, "occluded_ready", occluded, occluded);
+    define_ready_query(bvh, "count_ready", count, count);
 }
 
 }  // namespace wive

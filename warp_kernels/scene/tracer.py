@@ -84,6 +84,9 @@ class WarpTracer:
             wp.synchronize_stream(stream)
         return mesh
 
+    def at_once(self, query: str, origins: Any, directions: Any, tmin: Any, tmax: Any) -> None:
+        """None: all arrays are checked in Python."""
+
     def intersect(self, rays: Rays, work: Work) -> tuple[Hits, Stats | None]:
         """Closest hits."""
         with rays.library.on_stream(self.device), memory_errors():

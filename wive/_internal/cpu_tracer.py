@@ -16,7 +16,7 @@ from wive._internal.arrays import NUMPY
 from wive._internal.distant import Ball, Moved, Traced, moved
 from wive._internal.picture import Image, Settings
 from wive._internal.precision import Floats, real_of
-from wive._internal.rays import Rays
+from wive._internal.rays import Rays, rays_of_numpy
 from wive._internal.wrapping import Wrapping
 from wive.all_hits import AllHits, WrappedAllHits
 from wive.hits import Hits, Stats, WrappedHits, stats_of
@@ -37,6 +37,12 @@ class CpuTracer:
             real_of(bvh.vertices.dtype, bvh.accuracy),
         )
         self._kernels = _cpu.Kernels(backend)
+        self._vertices = bvh.vertices
+        self._ready: dict[str, Callable[..., Any]] = {
+            "intersect": bvh.intersect_ready,
+            "occluded": bvh.occluded_ready,
+            "count": bvh.count_ready,
+        }
 
     @property
     def tree(self) -> NoReturn:
@@ -45,6 +51,18 @@ class CpuTracer:
             f"tree is for scenes with backend 'warp', this one has {self.backend!r}: "
             "make it with device='cpu' or device='cuda:0'"
         )
+
+    def at_once(self, query: str, origins: Any, directions: Any, tmin: Any, tmax: Any) -> Any:
+        """The answer with the usual options, if rays are arrays that need no check in Python; else None."""
+        ready = self._ready.get(query)
+        found = None if ready is None else ready(self._kernels, origins, directions, tmin, tmax)
+        if found is None:
+            return None
+        if query == "intersect":
+            t, prim, uv, _ = found
+            rays = rays_of_numpy(origins, directions, tmin, tmax)
+            return Hits(t, prim, uv, self._vertices, self._faces, rays, self._accuracy)
+        return found[0]
 
     def intersect(self, rays: Rays, work: Work) -> tuple[Hits, Stats | None]:
         """Closest hits."""

@@ -61,6 +61,11 @@ ALL_NUMPY = NUMPY, NUMPY, NUMPY, NUMPY
 _of_numpy = functools.partial(tuple.__new__, Rays)
 
 
+def rays_of_numpy(origins: Any, directions: Any, tmin: Any, tmax: Any) -> Rays:
+    """Rays (n,3) of NumPy's arrays."""
+    return _of_numpy((origins, directions, tmin, tmax, NUMPY, ALL_NUMPY, True))
+
+
 def check_rays(
     origins: ArrayLike,
     directions: ArrayLike,

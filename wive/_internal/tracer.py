@@ -44,6 +44,9 @@ class Tracer(Protocol):
     def tree(self) -> Tree:
         """The tree on the Warp device; ValueError for CPU backends."""
 
+    def at_once(self, query: str, origins: Any, directions: Any, tmin: Any, tmax: Any) -> Any:
+        """The answer with the usual options, if rays are arrays that need no check in Python; else None."""
+
     def intersect(self, rays: Rays, work: Work) -> tuple[Hits, Stats | None]:
         """Closest hits."""
 
