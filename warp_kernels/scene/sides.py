@@ -155,6 +155,8 @@ def side_kernels(precision: str) -> SimpleNamespace:
         a, b = wp.float64(values[face[0], k]), wp.float64(values[face[1], k])
         answer[i, k] = answer.dtype(w * a + u * b + v * wp.float64(values[face[2], k]))
 
+    for number in (wp.float32, wp.float64):
+        wp.overload(interpolate, {"values": wp.array2d[number], "answer": wp.array2d[number]})
     return SimpleNamespace(front=front, cosines=cosines, interpolate=interpolate)
 
 
