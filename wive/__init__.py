@@ -21,6 +21,7 @@ from wive import embreex, trimesh
 from wive.all_hits import AllHits
 from wive.backend import Backend, backends
 from wive.camera import Camera
+from wive.geoms import Geoms
 from wive.hits import Hits, Stats
 from wive.meshfile import load_mesh
 from wive.rendering import render
@@ -34,6 +35,7 @@ __all__ = [
     "Backend",
     "Camera",
     "EquirectangularCamera",
+    "Geoms",
     "Hits",
     "OrthographicCamera",
     "PinholeCamera",

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from wive._internal.precision import Floats
 from wive._internal.read_only import ReadOnly
 from wive._internal.wrapping import Wrapping, from_home
-from wive.hits import surface_normals, surface_points
+from wive.geoms import Geoms
+from wive.hits import geoms_of, surface_normals, surface_points
 
 
 class AllHits(ReadOnly):
@@ -25,7 +26,7 @@ class AllHits(ReadOnly):
     Attributes:
         offsets: (n+1,) int64, the hits of ray i are rows offsets[i] to offsets[i+1] of the arrays below.
         t: (h,) float32, distance in multiples of the direction's length.
-        prim: (h,) int32, row of `faces` that was hit.
+        prim: (h,) int32, row of `faces` that was hit, also in a scene of several meshes.
         uv: (h,2) float32, the hit point is (1-u-v) v0 + u v1 + v v2.
         vertices: (v,3) float32 and
         faces: (f,3) int32, the mesh that `prim` refers to.
@@ -39,6 +40,7 @@ class AllHits(ReadOnly):
     uv: Floats
     vertices: Floats
     faces: NDArray[np.int32]
+    _geoms: Geoms | None = None
 
     def __init__(
         self,
@@ -48,9 +50,12 @@ class AllHits(ReadOnly):
         uv: Floats,
         vertices: Floats,
         faces: NDArray[np.int32],
+        geoms: Geoms | None = None,
     ) -> None:
         """Keep the arrays."""
         vars(self).update(offsets=offsets, t=t, prim=prim, uv=uv, vertices=vertices, faces=faces)
+        if geoms is not None:
+            vars(self).update(_geoms=geoms)
 
     @property
     def counts(self) -> NDArray[np.int32]:
@@ -61,6 +66,16 @@ class AllHits(ReadOnly):
     def ray(self) -> NDArray[np.int64]:
         """(h,) int64 ray of each hit; computed at each call."""
         return np.repeat(np.arange(len(self), dtype=np.int64), np.diff(self.offsets))
+
+    @property
+    def geom(self) -> NDArray[np.int32]:
+        """(h,) int32, the mesh of each hit, as `Hits.geom`; computed when read."""
+        return geoms_of(self).of(self.prim)
+
+    @property
+    def geom_prim(self) -> NDArray[np.int32]:
+        """(h,) int32, the row of each hit in the faces of its own mesh, as `Hits.geom_prim`."""
+        return geoms_of(self).within(self.prim)
 
     def points(self) -> NDArray[np.float64]:
         """(h,3) float64 hit points from the barycentrics, as `Hits.points`; computed at each call."""
@@ -79,7 +94,8 @@ class AllHits(ReadOnly):
         first, last = (int(offset) for offset in self.offsets[row_of(i, len(self)) :][:2])
         rows = slice(first, last)
         offsets = np.array([0, last - first], np.int64)
-        return AllHits(offsets, self.t[rows], self.prim[rows], self.uv[rows], self.vertices, self.faces)
+        arrays = self.t[rows], self.prim[rows], self.uv[rows]
+        return AllHits(offsets, *arrays, self.vertices, self.faces, self._geoms)
 
     def __iter__(self) -> Iterator[AllHits]:
         """The hits of each ray in turn."""
@@ -104,6 +120,8 @@ class WrappedAllHits(AllHits):
 
     counts = from_home(AllHits.counts)
     ray = from_home(AllHits.ray)
+    geom = from_home(AllHits.geom)
+    geom_prim = from_home(AllHits.geom_prim)
     points = from_home(AllHits.points)
     normals = from_home(AllHits.normals)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,6 +20,7 @@ from wive._internal.read_only import ReadOnly
 from wive._internal.sides import cosines_of, meets_front
 from wive._internal.spawn import spawn_origins
 from wive._internal.wrapping import Wrapping, from_home
+from wive.geoms import Geoms, one_geom
 
 
 class Stats(NamedTuple):
@@ -49,6 +50,19 @@ def surface_normals(
     return _cpu.surface_normals(vertices, faces, np.ascontiguousarray(prim))
 
 
+class OfMeshes(Protocol):
+    """Hits in a scene of one mesh or several."""
+
+    vertices: Floats
+    faces: NDArray[np.int32]
+    _geoms: Geoms | None
+
+
+def geoms_of(hits: OfMeshes) -> Geoms:
+    """The meshes of the scene that was hit; hits in a scene of one mesh hold none."""
+    return hits._geoms or one_geom(len(hits.faces), len(hits.vertices))
+
+
 class Hits(ReadOnly):
     """The closest hit of each of n rays; if these have another leading shape, (n,) below is that shape.
 
@@ -57,7 +71,7 @@ class Hits(ReadOnly):
 
     Attributes:
         t: (n,) float32, distance in multiples of the direction's length; inf on a miss.
-        prim: (n,) int32, row of `faces` that was hit; -1 on a miss.
+        prim: (n,) int32, row of `faces` that was hit, also in a scene of several meshes; -1 on a miss.
         uv: (n,2) float32, the hit point is (1-u-v) v0 + u v1 + v v2; NaN on a miss.
         vertices: (v,3) float32 and
         faces: (f,3) int32, the mesh that `prim` refers to.
@@ -73,6 +87,7 @@ class Hits(ReadOnly):
     _rays: Rays | None
     _accuracy: str
     _moved: Moved | None
+    _geoms: Geoms | None = None
 
     def __init__(
         self,
@@ -84,6 +99,7 @@ class Hits(ReadOnly):
         rays: Rays | None = None,
         accuracy: str = "",
         moved: Moved | None = None,
+        geoms: Geoms | None = None,
     ) -> None:
         """Keep the arrays; a scene adds its rays and accuracy, for `error_bound` and `spawn`."""
         # In one step: making hits is a tenth of a query of one ray.
@@ -98,11 +114,29 @@ class Hits(ReadOnly):
             "_moved": moved,
         }
         object.__setattr__(self, "__dict__", attributes)
+        if geoms is not None:
+            vars(self).update(_geoms=geoms)
 
     @property
     def mask(self) -> NDArray[np.bool_]:
         """(n,) bool, true if the ray hit something."""
         return self.prim >= 0
+
+    @property
+    def geom(self) -> NDArray[np.int32]:
+        """(n,) int32, the mesh that was hit, as `Scene.from_meshes` numbers them; -1 on a miss.
+
+        Computed when read; 0 for every hit in a scene of one mesh.
+        """
+        return geoms_of(self).of(self.prim)
+
+    @property
+    def geom_prim(self) -> NDArray[np.int32]:
+        """(n,) int32, the triangle that was hit as a row of the faces of its own mesh; -1 on a miss.
+
+        Computed when read; `prim` in a scene of one mesh.
+        """
+        return geoms_of(self).within(self.prim)
 
     def points(self) -> NDArray[np.float64]:
         """(n,3) float64 hit points from the barycentrics; NaN on a miss.
@@ -228,6 +262,8 @@ class WrappedHits(Hits):
         vars(self).update(_home=home, _wrapping=wrapping)
 
     mask = from_home(Hits.mask)
+    geom = from_home(Hits.geom)
+    geom_prim = from_home(Hits.geom_prim)
     points = from_home(Hits.points)
     normals = from_home(Hits.normals)
     error_bound = from_home(Hits.error_bound)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING, Any, TypeVar, overload
 
 import numpy as np
@@ -23,16 +23,27 @@ from wive._internal.files import PathLike, file_name
 from wive._internal.heightfield import heightfield_mesh
 from wive._internal.host_arrays import host_array
 from wive._internal.lines import one_line
-from wive._internal.mesh_objects import MeshObject, mesh_arrays
+from wive._internal.mesh_objects import MeshObject, PlacedMeshes, mesh_arrays
 from wive._internal.precision import Floats, Precision, real_of
 from wive._internal.rays import Rays, check_rays
 from wive._internal.segments import visible
+from wive._internal.several_meshes import Joined, Pair, join, name_the_mesh, refitted_mesh
 from wive._internal.shaped import query_shaped
 from wive._internal.spawn import spawn_from
-from wive._internal.storage import FORMAT_VERSION, Options, read_scene, refuse_newer, write_scene
+from wive._internal.storage import (
+    FORMAT_VERSION,
+    GEOMS,
+    Options,
+    geom_offsets,
+    geoms_of_offsets,
+    read_scene,
+    refuse_newer,
+    write_scene,
+)
 from wive._internal.tracer import Tracer
 from wive.all_hits import AllHits
 from wive.backend import resolve_backend
+from wive.geoms import Geoms, one_geom
 from wive.hits import Hits, Stats
 from wive.meshfile import MeshSource, load_mesh
 
@@ -96,15 +107,17 @@ class Scene:
             backend=backend, device=device, accuracy=accuracy, nodes=nodes, quality=quality
         )
         found, place = resolve_backend(backend, device)
-        rounding = ""
-        if faces is None:
+        rounding, geoms = "", None
+        if isinstance(vertices, Joined):
+            vertices, faces, geoms = vertices
+        elif faces is None:
             rounding, (vertices, faces) = "dtype=np.float32", mesh_arrays(vertices)
         given = host_array("vertices", vertices), host_array("faces", faces)
         mesh = arguments.mesh(*given, accuracy, dtype, rounding)
         points, self._faces = map(arguments.read_only, mesh)
         self._real = real_of(points.dtype, accuracy)
         bvh = _cpu.Bvh(points, self._faces, accuracy, nodes=nodes, quality=quality)
-        self._tracer = _tracer(bvh, self._faces, found, place)
+        self._tracer = _tracer(bvh, self._faces, found, place, geoms)
 
     @classmethod
     def from_file(
@@ -121,6 +134,33 @@ class Scene:
         hold finer numbers than float32.
         """
         return cls(*load_mesh(source, dtype, file_type=file_type), **kwargs)
+
+    @classmethod
+    def from_meshes(cls, meshes: Iterable[MeshObject | Pair] | PlacedMeshes, **kwargs: Any) -> Scene:
+        """One scene, with one tree, over several meshes; keywords are those of `Scene`.
+
+        Arguments:
+            meshes: a list whose items are (vertices, faces) or mesh objects, as `Scene` takes them; or a
+                `trimesh.Scene`, whose mesh i is node i of `scene.graph.nodes_geometry`, placed by its
+                transform in float64. All are copied. Meshes without triangles count.
+
+        Meshes are numbered from 0 in this order, and so are their triangles, one mesh after another:
+        `hits.prim` is the row of `scene.faces`, as in every scene, `hits.geom` the mesh, and
+        `hits.geom_prim` the row of the mesh's own faces. `geoms` has where each mesh begins.
+
+        The scene is float64 if the vertices of one mesh are an array of float64, else float32; `dtype`
+        decides if it is given.
+
+        Raises ValueError or TypeError, in one line naming the mesh by its number, such as "meshes[2]".
+
+        >>> scene = wive.Scene.from_meshes([(ground, ground_faces), trimesh.load_mesh("car.ply")])
+        """
+        joined = join(meshes, kwargs.get("dtype"), kwargs.get("accuracy", "watertight"))
+        try:
+            return cls(joined, **kwargs)
+        except ValueError:
+            name_the_mesh(joined)
+            raise
 
     @classmethod
     def from_heightfield(cls, z: ArrayLike, x: ArrayLike, y: ArrayLike, **kwargs: Any) -> Scene:
@@ -378,7 +418,7 @@ class Scene:
         origins: Floats = spawn_from(self.vertices, self._faces, prim, uv, directions, self.accuracy)
         return origins
 
-    def refit(self, vertices: ArrayLike) -> None:
+    def refit(self, vertices: ArrayLike, *, geom: int | None = None) -> None:
         """Move the vertices: new positions, the same faces.
 
         The tree keeps its shape and gets new boxes, in a sixth of the time that building takes. Hits are
@@ -395,15 +435,21 @@ class Scene:
             vertices: (v,3) real numbers, as many as before, used in the scene's precision. A C-contiguous
                 array of that dtype is kept, not copied, and may be the scene's own, changed in place; points
                 and normals of earlier hits follow it then.
+            geom: the number of a mesh of `from_meshes`: `vertices` are its vertices alone, and are copied,
+                all others stay. This takes the time of a refit of all.
 
         Raises ValueError or TypeError as construction does, and leaves the scene as it was.
         """
-        points = arguments.moved_vertices(host_array("vertices", vertices), len(self.vertices), self._real)
-        self._tracer = self._tracer.refitted(arguments.read_only(points))
+        given, tracer = host_array("vertices", vertices), self._tracer
+        if geom is not None:
+            self._tracer = refitted_mesh(tracer, self._faces, self.geoms, geom, given, self._real)
+            return
+        points = arguments.moved_vertices(given, len(self.vertices), self._real)
+        self._tracer = tracer.refitted(arguments.read_only(points))
 
     def save(self, path: PathLike) -> None:
         """Write the scene to a file that `wive.load` reads; the file is whole or absent."""
-        write_scene(path, self.vertices, self._faces, self._options)
+        write_scene(path, self.vertices, self._faces, self._tracer.geoms, self._options)
 
     @property
     def vertices(self) -> Floats:
@@ -414,6 +460,11 @@ class Scene:
     def faces(self) -> NDArray[np.int32]:
         """(f,3) int32, read-only."""
         return self._faces
+
+    @property
+    def geoms(self) -> Geoms:
+        """The meshes of `from_meshes`: the first row of each in `faces` and `vertices`; else one mesh."""
+        return self._tracer.geoms or one_geom(len(self._faces), len(self.vertices))
 
     @property
     def bounds(self) -> Floats:
@@ -465,11 +516,16 @@ class Scene:
     def __repr__(self) -> str:
         """Size and options."""
         options = f"backend={self.backend!r}, accuracy={self.accuracy!r}, precision={self.precision!r}"
-        return f"Scene({len(self)} triangles, {options})"
+        geoms = self._tracer.geoms
+        several = "" if geoms is None else f" in {len(geoms)} meshes"
+        return f"Scene({len(self)} triangles{several}, {options})"
 
     def __reduce__(self) -> tuple[Callable[..., Scene], tuple[Any, ...]]:
         """Pickle the mesh and the options; unpickling builds the tree again."""
-        return _rebuild, (self.vertices, self._faces, self._options, FORMAT_VERSION)
+        options: dict[str, Any] = {**self._options}
+        if self._tracer.geoms is not None:
+            options[GEOMS] = geom_offsets(self._tracer.geoms)
+        return _rebuild, (self.vertices, self._faces, options, FORMAT_VERSION)
 
     @property
     def _bvh(self) -> _cpu.Bvh:
@@ -502,12 +558,14 @@ class Scene:
         return answer if counters is None else (answer, counters)
 
 
-def _tracer(bvh: _cpu.Bvh, faces: NDArray[np.int32], backend: str, device: str | None) -> Tracer:
+def _tracer(
+    bvh: _cpu.Bvh, faces: NDArray[np.int32], backend: str, device: str | None, geoms: Geoms | None
+) -> Tracer:
     if device is None:
-        return CpuTracer(bvh, faces, backend)
+        return CpuTracer(bvh, faces, backend, geoms)
     from wive.warp_kernels.scene.tracer import WarpTracer
 
-    tracer: Tracer = WarpTracer(bvh, faces, device)
+    tracer: Tracer = WarpTracer(bvh, faces, device, geoms)
     return tracer
 
 
@@ -520,16 +578,18 @@ def load(path: PathLike, *, backend: str | None = None, device: str | None = Non
     Raises OSError if the file can't be read, ValueError if it is not a saved scene or its backend or device
     can't be used here.
     """
-    vertices, faces, options = read_scene(path)
+    vertices, faces, geoms, options = read_scene(path)
     if backend is not None or device is not None:
         options["backend"], options["device"] = backend or "auto", device
     try:
-        return Scene(vertices, faces, **options)
+        return Scene(Joined(vertices, faces, geoms), **options)
     except (TypeError, ValueError) as error:
         raise ValueError(f"{one_line(file_name(path))}: {error}") from error
 
 
-def _rebuild(vertices: Floats, faces: NDArray[np.int32], options: Options, version: int = 1) -> Scene:
+def _rebuild(vertices: Floats, faces: NDArray[np.int32], options: Any, version: int = 1) -> Scene:
     """The scene of a pickle; pickles that name no version are of the first."""
     refuse_newer("pickled scene", version, options)
-    return Scene(vertices, faces, **options)
+    offsets = options.pop(GEOMS, None)
+    geoms = None if offsets is None else geoms_of_offsets(offsets, len(faces), len(vertices))
+    return Scene(Joined(vertices, faces, geoms), **options)

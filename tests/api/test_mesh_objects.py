@@ -174,7 +174,7 @@ POINTS = np.zeros((4, 3))
         ((VERTICES, FACES), TypeError, r"got a tuple of both: wive\.Scene\(\*mesh\)"),
         (SimpleNamespace(vertex=3, triangle=3), TypeError, "got no positions"),
         (None, TypeError, "the mesh must have vertices and faces, got NoneType"),
-        (SimpleNamespace(to_mesh=0), TypeError, r"take wive\.Scene\(mesh\.to_mesh\(\)\)"),
+        (SimpleNamespace(graph=0, geometry={}), TypeError, r"take wive\.Scene\.from_meshes\(mesh\)$"),
         (SimpleNamespace(extract_surface=0), TypeError, r"\.extract_surface\(\)\.triangulate\("),
     ],
 )  # fmt: skip
@@ -195,7 +195,7 @@ def test_meshes_of_trimesh_are_taken_and_its_scenes_refused():
         assert type(scene.vertices) is type(scene.faces) is np.ndarray
     several = trimesh.Scene([box, ball])
     with pytest.raises(
-        TypeError, match=r"got a trimesh\.Scene: take wive\.Scene\(mesh\.\w+\(.*\)\)$"
+        TypeError, match=r"got a trimesh\.Scene: take wive\.Scene\.from_meshes\(mesh\)$"
     ) as raised:
         wive.Scene(several)
     way = str(raised.value).rpartition(": take ")[2]

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from wive._internal.spawn import ACCURACIES
 from wive.all_hits import row_of
 from wive.warp_kernels.lanes.precision import PRECISIONS
+from wive.warp_kernels.scene.geoms import number_geoms, number_within_geoms
 from wive.warp_kernels.scene.memory import memory_errors
 from wive.warp_kernels.scene.rays import WarpRays, as_vectors
 from wive.warp_kernels.scene.sides import side_kernels
@@ -37,6 +38,16 @@ class WarpHits:
     def mask(self) -> Any:
         """(n,) bool."""
         return self._computed(hit_kernels(self._tracer.precision).mask, wp.bool, [self.prim])
+
+    @property
+    def geom(self) -> Any:
+        """(n,) int32."""
+        return self._computed(number_geoms, wp.int32, [self._tracer.first_faces, self.prim])
+
+    @property
+    def geom_prim(self) -> Any:
+        """(n,) int32."""
+        return self._computed(number_within_geoms, wp.int32, [self._tracer.first_faces, self.prim])
 
     def points(self) -> Any:
         """(n,) vec3d."""

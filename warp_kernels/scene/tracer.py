@@ -19,6 +19,7 @@ from wive._internal.precision import Floats, real_of
 from wive._internal.rays import Rays
 from wive._internal.wrapping import Wrapping
 from wive.all_hits import AllHits, WrappedAllHits
+from wive.geoms import Geoms, one_geom
 from wive.hits import Hits, Stats, WrappedHits
 from wive.warp_kernels import (
     check,
@@ -52,9 +53,11 @@ class WarpTracer:
     backend = "warp"
     lacks = ("threads", "in_flight")
 
-    def __init__(self, bvh: _cpu.Bvh, faces: NDArray[np.int32], device: str) -> None:
+    def __init__(
+        self, bvh: _cpu.Bvh, faces: NDArray[np.int32], device: str, geoms: Geoms | None = None
+    ) -> None:
         """Copy the tree to the device, and wait until it is there: queries may use any stream."""
-        self.bvh, self.device = bvh, device
+        self.bvh, self.device, self.geoms = bvh, device, geoms
         self.vertices, self.faces = bvh.vertices, faces
         self.accuracy, self.precision = bvh.accuracy, bvh.precision
         with memory_errors():
@@ -70,19 +73,33 @@ class WarpTracer:
         Copied when first used, and waited for: later uses may be on any stream. On the host they share the
         scene's memory. RuntimeError if a graph is being captured, since nothing can wait then.
         """
+        vertices, faces = self._copied(
+            "points, normals, error_bound and spawn copy the mesh",
+            (self.vertices, self._numbers.vec3),
+            (self.faces, wp.vec3i),
+        )
+        return vertices, faces
+
+    @functools.cached_property
+    def first_faces(self) -> Any:
+        """(g+1,) int32 on the device: the first triangle of each mesh, and the number of all; as `mesh`."""
+        geoms = self.geoms or one_geom(len(self.faces), len(self.vertices))
+        (first_faces,) = self._copied(
+            "geom and geom_prim copy the numbers of the meshes", (geoms.faces, wp.int32)
+        )
+        return first_faces
+
+    def _copied(self, what: str, *arrays: tuple[NDArray[Any], Any]) -> list[Any]:
+        """NumPy's arrays as Warp's of these dtypes, once they are on the device."""
         stream = wp.get_stream(self.device) if self.device != "cpu" else None
         if stream is not None and stream.is_capturing:
             raise RuntimeError(
-                "points, normals, error_bound and spawn copy the mesh to the device when first used: "
-                "use one of them once before the graph is captured"
+                f"{what} to the device when first used: use one of them once before the graph is captured"
             )
-        mesh = (
-            wp.array(self.vertices, dtype=self._numbers.vec3, device=self.device, copy=False),
-            wp.array(self.faces, dtype=wp.vec3i, device=self.device, copy=False),
-        )
+        copies = [wp.array(array, dtype=dtype, device=self.device, copy=False) for array, dtype in arrays]
         if stream is not None:
             wp.synchronize_stream(stream)
-        return mesh
+        return copies
 
     def at_once(self, query: str, origins: Any, directions: Any, tmin: Any, tmax: Any) -> None:
         """None: all arrays are checked in Python."""
@@ -99,7 +116,7 @@ class WarpTracer:
                 check(self.tree)
                 found = t.numpy() if near is None else near.t(t.numpy())
                 arrays = found, prim.numpy(), uv.numpy(), self.vertices, self.faces
-                return Hits(*arrays, rays, self.accuracy, near), _numpy_stats(steps)
+                return Hits(*arrays, rays, self.accuracy, near, self.geoms), _numpy_stats(steps)
             hits = WarpHits(self, t, prim, uv, loaded)
             return WrappedHits(hits, self._wrapping(rays)), _stats(steps, rays)
 
@@ -142,17 +159,18 @@ class WarpTracer:
             if rays.library is NUMPY:
                 check(self.tree)
                 arrays = offsets.numpy(), t.numpy(), prim.numpy(), uv.numpy()
-                every = AllHits(*arrays, self.vertices, self.faces)
+                mesh = self.vertices, self.faces, self.geoms
+                every = AllHits(*arrays, *mesh)
                 if near is not None:
                     farther = near.t(every.t, every.ray)
-                    every = AllHits(arrays[0], farther, *arrays[2:], self.vertices, self.faces)
+                    every = AllHits(arrays[0], farther, arrays[2], arrays[3], *mesh)
                 return every, _numpy_stats(steps)
             hits = WarpAllHits(self, offsets, t, prim, uv)
             return WrappedAllHits(hits, self._wrapping(rays)), _stats(steps, rays)
 
     def refitted(self, vertices: Floats) -> WarpTracer:
         """A tracer of moved vertices, as many as before."""
-        return WarpTracer(self.bvh.refitted(vertices), self.faces, self.device)
+        return WarpTracer(self.bvh.refitted(vertices), self.faces, self.device, self.geoms)
 
     def rows_renderer(self, camera: Image, image: Image, settings: Settings) -> Callable[[int, int], int]:
         """A function that renders rows [begin, end) into `image` and returns how many rays it traced."""

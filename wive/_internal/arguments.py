@@ -176,12 +176,12 @@ def indices(name: str, value: ArrayLike, count: int, columns: tuple[int, ...]) -
     return rows.astype(np.int32)
 
 
-def moved_vertices(vertices: ArrayLike, count: int, real: Real) -> Floats:
+def moved_vertices(vertices: ArrayLike, count: int, real: Real, whose: str = "the scene's own") -> Floats:
     """New positions (count,3) in the scene's dtype, C-contiguous; not copied if they are so already."""
     points = _positions(vertices)
     if len(points) != count:
         raise ValueError(
-            f"vertices must have shape ({count}, 3), as the scene's own, got {points.shape}: "
+            f"vertices must have shape ({count}, 3), as {whose}, got {points.shape}: "
             "make a new Scene for another mesh"
         )
     return real.taken("vertices", vertices, points)

@@ -19,6 +19,7 @@ from wive._internal.precision import Floats, real_of
 from wive._internal.rays import Rays, rays_of_numpy
 from wive._internal.wrapping import Wrapping
 from wive.all_hits import AllHits, WrappedAllHits
+from wive.geoms import Geoms
 from wive.hits import Hits, Stats, WrappedHits, stats_of
 
 
@@ -28,9 +29,11 @@ class CpuTracer:
     device = None
     lacks = ("lanes",)
 
-    def __init__(self, bvh: _cpu.Bvh, faces: NDArray[np.int32], backend: str) -> None:
+    def __init__(
+        self, bvh: _cpu.Bvh, faces: NDArray[np.int32], backend: str, geoms: Geoms | None = None
+    ) -> None:
         """Take the tree; the kernels are looked up by the first query."""
-        self.bvh, self.backend = bvh, backend
+        self.bvh, self.backend, self.geoms = bvh, backend, geoms
         self._faces, self._accuracy, self._real = (
             faces,
             bvh.accuracy,
@@ -72,7 +75,7 @@ class CpuTracer:
         )
         if near is not None:
             t = near.t(t)
-        hits = Hits(t, prim, uv, self.bvh.vertices, self._faces, rays, self._accuracy, near)
+        hits = Hits(t, prim, uv, self.bvh.vertices, self._faces, rays, self._accuracy, near, self.geoms)
         if rays.library is not NUMPY:
             hits = WrappedHits(hits, _wrapping(rays))
         return hits, None if steps is None else stats_of(steps, rays.library)
@@ -99,16 +102,17 @@ class CpuTracer:
         options = work.threads, work.in_flight, work.stats, work.touching
         found = self.bvh.intersect_all(self._kernels, *arrays, *options, max_bytes=work.max_bytes)
         offsets, t, prim, uv, steps = found
-        hits = AllHits(offsets, t, prim, uv, self.bvh.vertices, self._faces)
+        mesh = self.bvh.vertices, self._faces, self.geoms
+        hits = AllHits(offsets, t, prim, uv, *mesh)
         if near is not None:
-            hits = AllHits(offsets, near.t(t, hits.ray), prim, uv, self.bvh.vertices, self._faces)
+            hits = AllHits(offsets, near.t(t, hits.ray), prim, uv, *mesh)
         if rays.library is not NUMPY:
             hits = WrappedAllHits(hits, _wrapping(rays))
         return hits, None if steps is None else stats_of(steps, rays.library)
 
     def refitted(self, vertices: Floats) -> CpuTracer:
         """A tracer of moved vertices, as many as before."""
-        return CpuTracer(self.bvh.refitted(vertices), self._faces, self.backend)
+        return CpuTracer(self.bvh.refitted(vertices), self._faces, self.backend, self.geoms)
 
     def rows_renderer(self, camera: Image, image: Image, settings: Settings) -> Callable[[int, int], int]:
         """A function that renders rows [begin, end) into `image` and returns how many rays it traced.

@@ -64,6 +64,18 @@ class VertexAndTriangle(Protocol):
         """(f,3) integers under "indices"."""
 
 
+class PlacedMeshes(Protocol):
+    """Meshes in places, such as `trimesh.Scene`."""
+
+    @property
+    def geometry(self) -> Any:
+        """Meshes by name."""
+
+    @property
+    def graph(self) -> Any:
+        """`nodes_geometry`, and by node its matrix (4,4) to the world and the name of its mesh."""
+
+
 MeshObject = VerticesAndFaces | VerticesAndTriangles | PointsAndFaces | VertexAndTriangle
 
 
@@ -72,10 +84,13 @@ MeshObject = VerticesAndFaces | VerticesAndTriangles | PointsAndFaces | VertexAn
 PAIRS = ("vertices", "faces"), ("points", "faces"), ("vertices", "triangles")
 # What makes one triangle mesh of an object that is none, by a method that such objects have.
 MENDS = {
-    "to_mesh": "to_mesh()",  # trimesh.Scene
-    "dump": "dump(concatenate=True)",  # trimesh.Scene of older versions
     "extract_surface": "extract_surface().triangulate()",  # PyVista's grids and blocks
 }
+
+
+def is_placed(mesh: Any) -> bool:
+    """Whether it is a scene such as `trimesh.Scene`: meshes in `geometry`, placed by the nodes of `graph`."""
+    return not isinstance(mesh, type) and hasattr(mesh, "geometry") and hasattr(mesh, "graph")
 
 
 def mesh_arrays(mesh: Any) -> tuple[Any, Any]:
@@ -115,7 +130,7 @@ def _unpadded(mesh: Any, cells: Any) -> Any:
     without_faces = len(cells) == 0 and getattr(mesh, "n_cells", 0) > 0
     if polygons or without_faces or getattr(mesh, "n_strips", 0) > 0:
         raise ValueError(
-            f"faces of a {_kind(mesh)} must be triangles, got "
+            f"faces of a {kind_of(mesh)} must be triangles, got "
             f"{'none' if without_faces else 'polygons'}: "
             "wive.Scene(mesh.triangulate()) takes polygons and strips as triangles"
         )
@@ -133,7 +148,7 @@ def _in_tensors(tensors: Any, name: str) -> Any:
     raise TypeError(f"the mesh must have vertex positions and triangle indices, got no {name}")
 
 
-def _kind(mesh: object) -> str:
+def kind_of(mesh: object) -> str:
     """The object's class as users write it."""
     kind = type(mesh)
     return f"{kind.__module__.partition('.')[0]}.{kind.__name__}".removeprefix("builtins.")
@@ -147,8 +162,10 @@ def _no_mesh(mesh: Any) -> str:
         return "faces must be given with vertices, got a tuple of both: wive.Scene(*mesh)"
     if isinstance(mesh, (np.ndarray, list, tuple)) or library_of(mesh) is not NUMPY:
         return "faces must be given with vertices, got an array alone: wive.Scene(vertices, faces)"
+    if is_placed(mesh):
+        return f"the mesh must be one triangle mesh, got a {kind_of(mesh)}: take wive.Scene.from_meshes(mesh)"
     for method, mend in MENDS.items():
         if hasattr(mesh, method) and not isinstance(mesh, type):
-            return f"the mesh must be one triangle mesh, got a {_kind(mesh)}: take wive.Scene(mesh.{mend})"
-    got = f"the class {mesh.__name__}" if isinstance(mesh, type) else _kind(mesh)
+            return f"the mesh must be one triangle mesh, got a {kind_of(mesh)}: take wive.Scene(mesh.{mend})"
+    got = f"the class {mesh.__name__}" if isinstance(mesh, type) else kind_of(mesh)
     return f"the mesh must have vertices and faces, got {got}: wive.Scene(vertices, faces) takes arrays"

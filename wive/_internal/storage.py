@@ -12,6 +12,7 @@ from wive._internal.lines import one_line
 from wive._internal.npzfile import Npz, open_npz
 from wive._internal.precision import Floats
 from wive._internal.room import room_for
+from wive.geoms import Geoms
 
 FORMAT = "wive scene"
 FORMAT_VERSION = 1
@@ -27,14 +28,19 @@ class Options(TypedDict):
     quality: QualityOption
 
 
+# Among the options of a scene of several meshes, so that wives that know one mesh alone refuse it; in a file
+# the number of meshes, and the name of the array of their offsets; in a pickle these offsets.
+GEOMS = "geoms"
 # What else a file or a pickle may hold is a newer wive's.
-OPTIONS = frozenset(Options.__annotations__)
+OPTIONS = frozenset(Options.__annotations__) | {GEOMS}
 # The arrays of a saved scene's file.
 HEADER, MESH = "header", ("vertices", "faces")
 ZIP = b"PK\x03\x04"
 
 
-def write_scene(path: PathLike, vertices: Floats, faces: NDArray[np.int32], options: Options) -> None:
+def write_scene(
+    path: PathLike, vertices: Floats, faces: NDArray[np.int32], geoms: Geoms | None, options: Options
+) -> None:
     """Write the file, in NumPy's npz format, vertices in their dtype, which is the scene's precision.
 
     An interrupted or failed write leaves nothing behind.
@@ -43,14 +49,36 @@ def write_scene(path: PathLike, vertices: Floats, faces: NDArray[np.int32], opti
 
     import wive
 
+    arrays: dict[str, Any] = {"vertices": vertices, "faces": faces}
+    saved: dict[str, Any] = {**options}
+    if geoms is not None:
+        arrays[GEOMS], saved[GEOMS] = geom_offsets(geoms), len(geoms)
     header = json.dumps(
-        {"format": FORMAT, "version": FORMAT_VERSION, "wive": wive.__version__, "options": options}
+        {"format": FORMAT, "version": FORMAT_VERSION, "wive": wive.__version__, "options": saved}
     )
     with atomic_write(path) as file:
-        np.savez(file, header=np.array(header), vertices=vertices, faces=faces)
+        np.savez(file, header=np.array(header), **arrays)
 
 
-def read_scene(path: PathLike) -> tuple[Floats, NDArray[np.int32], Options]:
+def geom_offsets(geoms: Geoms) -> NDArray[np.int32]:
+    """(2,g+1), the first triangle and the first vertex of each mesh, and how many there are."""
+    return np.stack([geoms.faces, geoms.vertices])
+
+
+def geoms_of_offsets(offsets: NDArray[Any], faces: int, vertices: int) -> Geoms:
+    """The meshes of a scene of so many faces and vertices; ValueError if the offsets are not theirs."""
+    is_table = offsets.ndim == 2 and len(offsets) == 2 and offsets.dtype == np.int32 and offsets.size > 0
+    if (
+        not is_table
+        or offsets[:, 0].any()
+        or (offsets[:, 1:] < offsets[:, :-1]).any()
+        or offsets[:, -1].tolist() != [faces, vertices]
+    ):
+        raise ValueError(f"offsets of meshes must ascend from 0 to {faces} and {vertices}")
+    return Geoms(offsets[0].copy(), offsets[1].copy())
+
+
+def read_scene(path: PathLike) -> tuple[Floats, NDArray[np.int32], Geoms | None, Options]:
     """Read what `write_scene` wrote.
 
     Raises OSError if the file can't be read, ValueError if it is no scene or of a newer version.
@@ -72,9 +100,16 @@ def read_scene(path: PathLike) -> tuple[Floats, NDArray[np.int32], Options]:
                 quality=given.get("quality", "medium"),
             )
             vertices, faces = (found[name] for name in MESH)
+            offsets = found[GEOMS] if GEOMS in given else None
         except (KeyError, TypeError):  # options that are no dict are a TypeError
             raise ValueError(no_scene) from None
-    return vertices, faces, options
+    if offsets is None:
+        return vertices, faces, None, options
+    try:
+        geoms = geoms_of_offsets(offsets, len(faces), len(vertices))
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"{no_scene}: {error}") from None
+    return vertices, faces, geoms, options
 
 
 def refuse_newer(what: str, version: int, options: object, writer: object = None) -> None:

@@ -13,6 +13,7 @@ from wive._internal.rays import Rays
 
 if TYPE_CHECKING:
     from wive.all_hits import AllHits
+    from wive.geoms import Geoms
     from wive.hits import Hits, Stats
     from wive.warp_kernels import Tree
 
@@ -39,6 +40,10 @@ class Tracer(Protocol):
     @property
     def bvh(self) -> _cpu.Bvh:
         """The tree in host memory."""
+
+    @property
+    def geoms(self) -> Geoms | None:
+        """The meshes that the scene was made of; None if it is one."""
 
     @property
     def tree(self) -> Tree:
