@@ -87,7 +87,7 @@ class Hits(ReadOnly):
     _rays: Rays | None
     _accuracy: str
     _moved: Moved | None
-    _geoms: Geoms | None = None
+    _geoms: Geoms | None
 
     def __init__(
         self,
@@ -112,10 +112,9 @@ class Hits(ReadOnly):
             "_rays": rays,
             "_accuracy": accuracy,
             "_moved": moved,
+            "_geoms": geoms,
         }
         object.__setattr__(self, "__dict__", attributes)
-        if geoms is not None:
-            vars(self).update(_geoms=geoms)
 
     @property
     def mask(self) -> NDArray[np.bool_]:

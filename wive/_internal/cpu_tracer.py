@@ -64,7 +64,8 @@ class CpuTracer:
         if query == "intersect":
             t, prim, uv, _ = found
             rays = rays_of_numpy(origins, directions, tmin, tmax)
-            return Hits(t, prim, uv, self._vertices, self._faces, rays, self._accuracy)
+            mesh = self._vertices, self._faces
+            return Hits(t, prim, uv, *mesh, rays, self._accuracy, None, self.geoms)
         return found[0]
 
     def intersect(self, rays: Rays, work: Work) -> tuple[Hits, Stats | None]:
