@@ -56,6 +56,23 @@ def test_hits_are_the_nearest_of_those_of_each_mesh(backend, accuracy, dtype):
     np.testing.assert_array_equal(hits.geom >= 0, hits.mask)
 
 
+@pytest.mark.parametrize("query", ["intersect", "intersect_all"])
+def test_one_ray_has_the_mesh_it_has_among_others(backend, query):
+    scene = wive.Scene.from_meshes(meshes(), backend=backend)
+    every = getattr(scene, query)(*RAYS)
+    hit = (every.mask if query == "intersect" else every.counts > 0).nonzero()[0][:20]
+    for ray in hit:
+        origins, directions = (rows[ray : ray + 1] for rows in RAYS)
+        for one in (
+            getattr(scene, query)(origins, directions),
+            getattr(scene, query)(origins[0].tolist(), directions[0].tolist()),
+        ):
+            expected = slice(ray, ray + 1) if query == "intersect" else slice(*every.offsets[ray : ray + 2])
+            np.testing.assert_array_equal(one.geom, every.geom[expected])
+            np.testing.assert_array_equal(one.geom_prim, every.geom_prim[expected])
+    assert len(hit) == 20
+
+
 def test_prim_is_the_row_of_the_scenes_faces():
     given = meshes()
     scene = wive.Scene.from_meshes(given)
