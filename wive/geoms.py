@@ -30,10 +30,14 @@ class Geoms(ReadOnly):
 
     def of(self, prim: NDArray[np.int32]) -> NDArray[np.int32]:
         """The mesh of each triangle `prim` of the scene; -1 for -1."""
+        if len(self) == 1:
+            return np.minimum(prim, np.int32(0))
         return np.asarray(np.searchsorted(self.faces[:-1], prim, side="right") - 1, np.int32)
 
     def within(self, prim: NDArray[np.int32]) -> NDArray[np.int32]:
         """The number of each triangle `prim` of the scene within its mesh; -1 for -1."""
+        if len(self) == 1:
+            return prim
         return np.where(prim >= 0, prim - self.faces[self.of(prim)], np.int32(-1))
 
     def __len__(self) -> int:

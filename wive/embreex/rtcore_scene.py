@@ -11,7 +11,6 @@ from wive._internal import arguments
 from wive._internal.arguments import AccuracyOption
 from wive._internal.precision import FLOAT32, Floats
 from wive.embreex.rtcore import EmbreeDevice
-from wive.hits import Hits
 from wive.scene import Scene
 
 QUERIES = "INTERSECT", "OCCLUDED", "DISTANCE"
@@ -44,30 +43,24 @@ class EmbreeScene:
         self._tmin = 0.0 if robust else ABOVE_ZERO
         self._accuracy: AccuracyOption = "watertight" if robust else "fast"
         self._scene = Scene(np.zeros((0, 3), np.float32), np.zeros((0, 3), np.int32))
-        self._added: list[tuple[Floats, NDArray[np.int32]]] = []  # since the tree was built
+        self._meshes: list[tuple[Floats, NDArray[np.int32]]] = []
         self._normals: NDArray[np.float32] | None = None  # of the tree's triangles, from when they are needed
-        self._starts = np.zeros(1, np.int64)  # the first triangle of each mesh, and the number of all
 
     @property
     def scene(self) -> Scene:
         """The `wive.Scene` over all meshes added so far, one after another."""
         if not self.is_committed:
-            parts, faces, count = [self._scene.vertices], [self._scene.faces], len(self._scene.vertices)
-            for vertices, triangles in self._added:
-                parts.append(vertices)
-                faces.append(triangles + np.int32(count))
-                count += len(vertices)
-            self._scene = Scene(np.concatenate(parts), np.concatenate(faces), accuracy=self._accuracy)
-            self._added, self._normals = [], None
+            if self._meshes:
+                self._scene = Scene.from_meshes(self._meshes, accuracy=self._accuracy)
+            self._normals = None
             self.is_committed = 1
         return self._scene
 
     def add(self, vertices: Floats, triangles: NDArray[np.int32]) -> int:
         """Add a mesh of vertices (v,3) float32 and triangles (f,3) int32, both kept; returns its number."""
-        self._added.append((vertices, triangles))
-        self._starts = np.append(self._starts, self._starts[-1] + len(triangles))
+        self._meshes.append((vertices, triangles))
         self.is_committed = 0
-        return len(self._starts) - 2
+        return len(self._meshes) - 1
 
     @overload
     def run(
@@ -135,30 +128,20 @@ class EmbreeScene:
             directions = directions[0]
         ends = arguments.limits("dists", FAR if dists is None else dists, count)
         tmax = ends if ends.size == count else ends[0]
-        scene, starts = self.scene, self._starts
+        scene = self.scene
         if query == "OCCLUDED":
             return scene.occluded(origins, directions, self._tmin, tmax).astype(np.int32) - np.int32(1)
         hits = scene.intersect(origins, directions, self._tmin, tmax)
         if query == "DISTANCE" and not output:
             return np.where(hits.mask, hits.t, ends)
-        prim, geom = _numbers(hits, starts)
         if not output:
-            return prim
+            return hits.geom_prim
         u, v = np.where(hits.mask, hits.uv.T, np.float32(0))
         tfar = np.where(hits.mask, hits.t, ends)
         if self._normals is None:
             self._normals = _normals(scene)
         normals = self._normals[hits.prim]
-        return {"u": u, "v": v, "Ng": normals, "tfar": tfar, "primID": prim, "geomID": geom}
-
-
-def _numbers(hits: Hits, starts: NDArray[np.int64]) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-    """(n,) int32 triangles, numbered from 0 in each mesh, and (n,) int32 meshes; -1 on a miss."""
-    if len(starts) == 2:  # one mesh
-        return hits.prim, np.minimum(hits.prim, 0)
-    geom = np.searchsorted(starts[1:], hits.prim, side="right")
-    prim = np.where(hits.mask, hits.prim - starts[geom], -1)
-    return prim.astype(np.int32), np.where(hits.mask, geom, -1).astype(np.int32)
+        return {"u": u, "v": v, "Ng": normals, "tfar": tfar, "primID": hits.geom_prim, "geomID": hits.geom}
 
 
 def _normals(scene: Scene) -> NDArray[np.float32]:
