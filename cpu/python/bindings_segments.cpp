@@ -70,17 +70,16 @@ py::tuple segment_rays(const Array<double>& a, const Array<double>& b, const std
 // (h,) whether triangle prim[k] lies between the ends of segment row[k]; false for a miss. constants: the members of
 // Separation; errors: how far coordinates of a and b are off, relative to them.
 template <class Real>
-py::array_t<bool> between(const Array<Real>& vertices, const Array<std::int32_t>& faces,
-                          const Array<std::int32_t>& prim, const Array<std::int64_t>& row, const Array<double>& a,
-                          const Array<double>& b, const std::array<double, 2>& constants,
-                          const std::array<double, 2>& errors, unsigned threads) {
+Array<bool> between(const Array<Real>& vertices, const Array<std::int32_t>& faces, const Array<std::int32_t>& prim,
+                    const Array<std::int64_t>& row, const Array<double>& a, const Array<double>& b,
+                    const std::array<double, 2>& constants, const std::array<double, 2>& errors, unsigned threads) {
     const Ends first(a, "a: expected shape (n, 3)"), second(b, "b: expected shape (n, 3)");
     const auto segments = static_cast<std::size_t>(segment_count(a, b));
     expect(row.size() == prim.size(), "row: expected as many as prim");
     const Separation separation = {constants[0], constants[1]};
     const std::int64_t* rows = row.data();
     expect_memory(static_cast<std::size_t>(prim.size()));
-    py::array_t<bool> answer(prim.size());
+    auto answer = new_array<bool>({prim.size()});
     bool* out = answer.mutable_data();
     const auto decide = [&](std::size_t k, TriangleCorners corner) {
         const std::size_t i = load_index(rows + k);

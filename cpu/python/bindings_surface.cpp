@@ -116,7 +116,7 @@ py::array_t<double> error_bounds(const Array<Real>& vertices, const Array<std::i
     const ErrorBound error = {rounding, margin, underflow};
     const Real *distances = t.data(), *from = origins.data(), *along = directions.data();
     expect_memory(sizeof(double) * static_cast<std::size_t>(prim.size()));
-    py::array_t<double> answer(prim.size());
+    auto answer = new_array<double>({prim.size()});
     double* out = answer.mutable_data();
     for_each_hit(vertices, faces, prim, [=](std::size_t i, TriangleCorners corner) {
         const double origin[3] = {from[3 * i], from[3 * i + 1], from[3 * i + 2]};

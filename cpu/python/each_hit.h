@@ -79,9 +79,9 @@ void for_each_hit(const Array<Real>& vertices, const Array<std::int32_t>& faces,
 
 // An array of three columns.
 template <class T>
-py::array_t<T> make_rows(py::ssize_t count) {
+Array<T> make_rows(py::ssize_t count) {
     expect_memory(3 * sizeof(T) * static_cast<std::size_t>(count));
-    return py::array_t<T>({count, py::ssize_t{3}});
+    return new_array<T>({count, 3});
 }
 
 // Throws unless `array` has that many columns and one row per hit.

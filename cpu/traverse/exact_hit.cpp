@@ -29,10 +29,8 @@ int bits_of(std::span<const float> values, int unit) {
 // Whether Int128 holds every number of the intersection. Differences of coordinates have `size` bits and components of
 // the direction `way`; then the height has 3 size + 3, and the determinant 2 size + way + 5.
 bool fits_narrow(const CallerRay& ray, std::span<const float> corners, int unit) {
-    int way_unit = 104;
-    for (const float d : ray.direction) way_unit = std::min(way_unit, BigInt::exponent_of(d));
     const int size = std::max(bits_of(ray.origin, unit), bits_of(corners, unit)) + 1;
-    const int way = bits_of(ray.direction, way_unit);
+    const int way = bits_of(ray.direction, wide::ExactIntersection::unit_of(ray.direction, 3));
     return 3 * size + 3 <= 127 && 2 * size + way + 5 <= 127;
 }
 
@@ -52,7 +50,7 @@ int compare(const CallerRay& ray, const TriangleCorners& one, const TriangleCorn
 }  // namespace
 
 bool hits_exactly(const CallerRay& ray, const TriangleCorners& corners, bool crossings, RoundedHit& hit) {
-    const int unit = wide::ExactIntersection::unit_of(ray.origin, corners.v);
+    const int unit = wide::ExactIntersection::unit_of(corners.v, 9, wide::ExactIntersection::unit_of(ray.origin, 3));
     if (fits_narrow(ray, corners.v, unit))
         return hits(narrow::ExactIntersection(ray.origin, ray.direction, corners.v, unit), crossings, hit);
     return hits(wide::ExactIntersection(ray.origin, ray.direction, corners.v, unit), crossings, hit);
@@ -62,7 +60,7 @@ int compare_distances(const CallerRay& ray, const TriangleCorners& one, const Tr
     if (wide::ExactIntersection::are_same(one.v, other.v)) return 0;
     using Narrow = narrow::ExactIntersection;
     using Wide = wide::ExactIntersection;
-    const int unit = Wide::unit_of(ray.origin, other.v, Wide::unit_of(ray.origin, one.v));
+    const int unit = Wide::unit_of(other.v, 9, Wide::unit_of(one.v, 9, Wide::unit_of(ray.origin, 3)));
     const bool narrow = fits_narrow(ray, one.v, unit) && fits_narrow(ray, other.v, unit);
     return narrow ? compare<Narrow>(ray, one, other, unit) : compare<Wide>(ray, one, other, unit);
 }

@@ -104,7 +104,8 @@ _SOLVE = (
     // In a plane across an axis on which the direction is zero: edge-on, as in a floor that the ray lies in.
     for (int i = 0; i < 3; ++i)
         if (way[i] == 0.0f && corners[i] == corners[3 + i] && corners[i] == corners[6 + i]) return hit;
-    const ExactIntersection exact(from, way, corners, ExactIntersection::unit_of(from, corners));
+    const int unit = ExactIntersection::unit_of(corners, 9, ExactIntersection::unit_of(from, 3));
+    const ExactIntersection exact(from, way, corners, unit);
     if (!(crossings ? exact.hit_perturbed : exact.hit)) return hit;
     const float t = exact.t();
     // -0 is that of a hit behind the origin.
@@ -123,7 +124,8 @@ _COMPARE = (
     + """
     float others[9];
     for (int i = 0; i < 9; ++i) others[i] = ((const float*)units)[other[i / 3] + other_stride * (i % 3)];
-    const int unit = ExactIntersection::unit_of(from, others, ExactIntersection::unit_of(from, corners));
+    int unit = ExactIntersection::unit_of(corners, 9, ExactIntersection::unit_of(from, 3));
+    unit = ExactIntersection::unit_of(others, 9, unit);
     if (ExactIntersection::are_same(corners, others)) return 0;
     return ExactIntersection(from, way, corners, unit).compare(ExactIntersection(from, way, others, unit));
 """
