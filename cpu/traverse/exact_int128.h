@@ -12,7 +12,7 @@ namespace wive {
 __extension__ typedef __int128 Signed128;
 __extension__ typedef unsigned __int128 Unsigned128;
 
-// The functions of BigInt that the test uses; the caller makes sure that nothing overflows (fits()).
+// The functions of BigInt that the test uses. Only for numbers that fit: fits_narrow() in exact_hit.cpp.
 struct Int128 {
     Signed128 value;
 
