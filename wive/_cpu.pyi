@@ -112,6 +112,9 @@ class Bvh:
     def extent(self) -> NDArray[np.float32]:
         """(3,) the largest |plane| on each axis: the half size of the tree round its center."""
     @property
+    def far_distance(self) -> float:
+        """The distance from the middle of the bounds beyond which float32 moves rays by too much."""
+    @property
     def bounds(self) -> NDArray[Any]:
         """(2,3) lowest and highest corner of the triangles that can be hit; inf, -inf if there are none."""
     @property
@@ -289,6 +292,36 @@ def segment_rays(
 
     A ray starts at the end that is nearer to center (3,), so a segment and its reverse are one ray.
     """
+
+def bring_near(
+    origins: NDArray[Any],
+    directions: NDArray[Any],
+    rounded_origins: NDArray[Any],
+    rounded_directions: NDArray[Any],
+    tmin: NDArray[Any],
+    tmax: NDArray[Any],
+    center: Sequence[float],
+    far: float,
+    most: float,
+    kept: bool,
+    threads: int = 0,
+) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any], NDArray[np.float64]] | None:
+    """Rays (n,3) farther than far from center (3,), as they come nearest to it; None if there are none.
+
+    Returns origins (n,3), tmin, tmax and how far each ray was moved (n,), in lengths of its direction. tmin
+    and tmax: (n,), or (1,) for all. Origins with a coordinate beyond most stay; kept: rays that float32
+    holds as well.
+    """
+
+def nearest_ahead(
+    origins: NDArray[np.float64],
+    directions: NDArray[np.float64],
+    center: Sequence[float],
+    far: float,
+    most: float,
+    threads: int = 0,
+) -> NDArray[np.float64]:
+    """(n,3) where rays farther than far from center come nearest to it, if that lies ahead; or origins."""
 
 def between(
     vertices: NDArray[Real],

@@ -8,6 +8,7 @@
 
 #include "build/binary_tree.h"
 #include "build/emit.h"
+#include "build/far_away.h"
 #include "build/reinsertion.h"
 #include "build/write_node.h"
 #include "core/ensure.h"
@@ -59,6 +60,7 @@ void Bvh::build(const Mesh<Real>& mesh, const BuildOptions& options, Threads& th
     constexpr bool doubles = precision_of<Real> == Precision::float64;
     check_mesh(mesh, threads);
     if constexpr (doubles) set_bounds(find_bounds(mesh, threads));
+    far_away_ = far_away_from(mesh);
     const auto build_binary = [&] {
         PrimRefs refs = make_prim_refs(mesh, center_, threads);
         // Before the work: if full blocks alone are too large, emit_tree would refuse the tree.
@@ -112,7 +114,35 @@ Point Bvh::finish_bounds(const Box& all) {
 }
 
 BvhView Bvh::view() const {
-    return {units_.data(), {center_[0], center_[1], center_[2], 0}, {extent_[0], extent_[1], extent_[2], 0}};
+    return {units_.data(), {center_[0], center_[1], center_[2], 0}, {extent_[0], extent_[1], extent_[2], 0}, far_away_};
+}
+
+// Beyond 256 radii, float32 moves a ray by up to 1e-4 radii, which may be more than a typical triangle's size before.
+// Coordinates of the scene themselves are rounded by as much as distances up to those of its middle.
+double Bvh::far_distance() const {
+    const auto& [low, high] = bounds_;
+    const double radius = 0.5 * std::hypot(high[0] - low[0], high[1] - low[1], high[2] - low[2]);
+    if (!(radius < std::numeric_limits<double>::infinity())) return std::numeric_limits<double>::infinity();
+    double distance = std::clamp<double>(far_away_, 2 * radius, 256 * radius);
+    for (std::size_t axis = 0; axis < 3; ++axis)
+        distance = std::max(distance, std::abs(0.5 * low[axis] + 0.5 * high[axis]));
+    return distance;
+}
+
+bool Bvh::may_have_far(const float* origins, std::size_t count) const {
+    const auto& [low, high] = bounds_;
+    constexpr double infinity = std::numeric_limits<double>::infinity();
+    double lowest = -infinity, highest = infinity;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+        const double middle = 0.5 * low[axis] + 0.5 * high[axis];
+        lowest = std::max(lowest, middle - far_distance());
+        highest = std::min(highest, middle + far_distance());
+    }
+    const float least = static_cast<float>(lowest), most = static_cast<float>(highest);
+    unsigned beyond = 0;  // no early end, so that the loop runs on vectors
+    for (std::size_t i = 0; i < 3 * count; ++i)
+        beyond |= static_cast<unsigned>(origins[i] <= least) | static_cast<unsigned>(origins[i] >= most);
+    return beyond != 0;
 }
 
 template <class StoredNode>

@@ -38,6 +38,11 @@ public:
     std::unique_ptr<Bvh> refitted(const Mesh<Real>& mesh, unsigned threads) const;
 
     BvhView view() const;
+    // The distance from the middle of the bounds beyond which float32 moves rays by too much: they are brought nearer
+    // before they are traced (wive/_internal/distant.py).
+    double far_distance() const;
+    // Whether an origin (n, 3) may be farther away.
+    bool may_have_far(const float* origins, std::size_t count) const;
     std::size_t bytes() const { return units_.size(); }
     // The stored bytes of all nodes and of all blocks. Compressed blocks have two sizes (see CompressedBlock).
     std::span<const std::byte> nodes() const { return {units_.data(), node_count_ * node_bytes()}; }
@@ -74,6 +79,7 @@ private:
     NodeForm form_ = NodeForm::float32;
     int depth_ = 0;
     Point center_{}, extent_{};
+    float far_away_ = 0;
     Bounds bounds_{};
 };
 

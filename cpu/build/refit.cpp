@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "build/builder.h"
+#include "build/far_away.h"
 #include "build/write_node.h"
 #include "core/parallel.h"
 
@@ -142,6 +143,7 @@ std::unique_ptr<Bvh> Bvh::refitted(const Mesh<Real>& mesh, unsigned requested_th
     bvh->accuracy_ = accuracy_;
     bvh->precision_ = precision_;
     bvh->depth_ = depth_;
+    bvh->far_away_ = far_away_from(mesh);
     const BvhView from = view();
     if constexpr (precision_of<Real> == Precision::float64) bvh->set_bounds(find_bounds(mesh, threads));
     BoxFitter<Real> fitter(from, node_count_, bvh->units_.data(), mesh, bvh->center_, accuracy_);

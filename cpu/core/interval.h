@@ -19,7 +19,8 @@ namespace wive {
 [[gnu::always_inline]] inline float float_above(double x) { return -float_below(-x); }
 
 // The closed interval [tmin, tmax]. Slab tests are in float for either precision: box_tmin() and box_tmax() are the
-// interval's ends rounded outwards, so that no box with a hit in the interval is missed.
+// interval's ends rounded outwards, so that no box with a hit in the interval is missed. For boxes, a float64 ray may
+// start elsewhere than for triangles (RayFrame::bring_boxes_near).
 template <class Real>
 struct Interval;
 
@@ -38,13 +39,19 @@ template <>
 struct Interval<double> {
     double tmin, tmax;
     float tmin_below, tmax_above;
+    double box_start = 0;  // t where the ray starts for boxes
 
     [[gnu::always_inline]] float box_tmin() const { return tmin_below; }
     [[gnu::always_inline]] float box_tmax() const { return tmax_above; }
     [[gnu::always_inline]] bool holds(double t) const { return t >= tmin && t <= tmax; }
     [[gnu::always_inline]] void end_at(double t) {
         tmax = t;
-        tmax_above = float_above(t);
+        tmax_above = float_above(t - box_start);
+    }
+    void start_boxes_at(double t) {
+        box_start = t;
+        tmin_below = float_below(tmin - t);
+        tmax_above = float_above(tmax - t);
     }
     [[gnu::always_inline]] static Interval of(double tmin, double tmax) {
         return {tmin, tmax, float_below(tmin), float_above(tmax)};

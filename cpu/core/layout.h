@@ -113,6 +113,7 @@ struct BvhView {
     const std::byte* units;       // begins with the root, which is always an inner node
     alignas(16) float center[4];  // planes are relative to this point; lane 3 is zero
     alignas(16) float extent[4];  // the largest |coordinate - center| on each axis; lane 3 is zero
+    float far_away;  // from farther off the centre, the slack of the boxes (frame.h) is larger than many triangles
 
     // child must be inner: no bits need to be masked off then.
     template <class Form>

@@ -220,6 +220,11 @@ PYBIND11_MODULE(_cpu, m, pybind11::mod_gil_not_used()) {
                                    if (self.bvh().precision() == Precision::float64) return bounds;
                                    return py::array_t<float>(bounds);
                                })
+        .def_property_readonly("far_distance",
+                               [](const PyBvh& self) {
+                                   const DefaultFloats floats;
+                                   return self.bvh().far_distance();
+                               })
         .def_property_readonly("accuracy", [](const PyBvh& self) { return accuracy_name(self.bvh().accuracy()); })
         .def_property_readonly(
             "node_form",
@@ -239,4 +244,5 @@ PYBIND11_MODULE(_cpu, m, pybind11::mod_gil_not_used()) {
     bind_surface(m);
     bind_spawn(m);
     bind_segments(m);
+    bind_distant(m);
 }

@@ -161,6 +161,7 @@ void bind_queries(PyBvhClass& bvh);
 void bind_surface(py::module_& m);
 void bind_spawn(py::module_& m);
 void bind_segments(py::module_& m);
+void bind_distant(py::module_& m);
 
 }  // namespace wive
 

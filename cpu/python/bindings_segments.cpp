@@ -51,19 +51,14 @@ py::tuple segment_rays(const Array<double>& a, const Array<double>& b, const std
     auto origins = make_rows<double>(count), directions = make_rows<double>(count);
     double *from = origins.mutable_data(), *along = directions.mutable_data();
     const Double3 middle = Double3::load(center.data());
-    {
-        const Released released;
-        const auto segments = static_cast<std::size_t>(count);
-        Threads workers(segments > hits_per_chunk ? thread_count(threads) : 1);
-        parallel_chunks(segments, hits_per_chunk, workers, [&](std::size_t begin, std::size_t end) {
-            for (std::size_t i = begin; i < end; ++i) {
-                const bool forward = starts_at_first(first[i], second[i], middle);
-                const Double3 start = Double3::load(forward ? first[i] : second[i]);
-                start.store(from + 3 * i);
-                (Double3::load(forward ? second[i] : first[i]) - start).store(along + 3 * i);
-            }
-        });
-    }
+    for_each_chunk(static_cast<std::size_t>(count), threads, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i < end; ++i) {
+            const bool forward = starts_at_first(first[i], second[i], middle);
+            const Double3 start = Double3::load(forward ? first[i] : second[i]);
+            start.store(from + 3 * i);
+            (Double3::load(forward ? second[i] : first[i]) - start).store(along + 3 * i);
+        }
+    });
     return py::make_tuple(std::move(origins), std::move(directions));
 }
 

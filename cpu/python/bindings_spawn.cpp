@@ -122,7 +122,7 @@ py::array_t<Real> spawn_origins(const Array<Real>& vertices, const Array<std::in
         accuracy, std::is_same_v<Real, float>, point, normal, corner_error, weights_error, fast, step, least, margin};
     auto answer = make_rows<Real>(prim.size());
     const SpawnCall<Real> call = {triangles, uv.data(), directions.data(), answer.mutable_data(), spawn};
-    triangles.for_each_chunk(0, [&](std::size_t begin, std::size_t end) {
+    for_each_chunk(triangles.size(), 0, [&](std::size_t begin, std::size_t end) {
 #if defined(__x86_64__)
         if (has_avx2()) return run_avx2(call, begin, end);
 #endif

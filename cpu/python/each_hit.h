@@ -20,6 +20,15 @@ std::size_t load_index(const Index* from) {
     return static_cast<std::size_t>(static_cast<std::make_unsigned_t<Index>>(__atomic_load_n(from, __ATOMIC_RELAXED)));
 }
 
+// Calls work(begin, end) for chunks of `size` rows, on so many threads (0 is every core), with the interpreter lock
+// released.
+template <class Work>
+void for_each_chunk(std::size_t size, unsigned requested_threads, const Work& work) {
+    const Released released;
+    Threads threads(size > hits_per_chunk ? thread_count(requested_threads) : 1);
+    parallel_chunks(size, hits_per_chunk, threads, work);
+}
+
 // The triangles of hits: rows of `faces`, or none.
 template <class Real>
 class HitTriangles {
@@ -46,15 +55,6 @@ public:
         return true;
     }
 
-    // Calls work(begin, end) for chunks of the hits, on so many threads (0 is every core), with the interpreter lock
-    // released.
-    template <class Work>
-    void for_each_chunk(unsigned requested_threads, const Work& work) const {
-        const Released released;
-        Threads threads(size_ > hits_per_chunk ? thread_count(requested_threads) : 1);
-        parallel_chunks(size_, hits_per_chunk, threads, work);
-    }
-
 private:
     static std::size_t to_size(py::ssize_t size) { return static_cast<std::size_t>(size); }
 
@@ -63,12 +63,12 @@ private:
     std::size_t size_, face_count_ = 0, point_count_ = 0;
 };
 
-// Calls row(i, corners of the triangle of hit i, in double), as for_each_chunk does. The corners of a miss are null.
+// Calls row(i, corners of the triangle of hit i, in double), in chunks. The corners of a miss are null.
 template <class Real, class Row>
 void for_each_hit(const Array<Real>& vertices, const Array<std::int32_t>& faces, const Array<std::int32_t>& prim,
                   const Row& row, unsigned threads = 0) {
     const HitTriangles<Real> triangles(vertices, faces, prim);
-    triangles.for_each_chunk(threads, [&](std::size_t begin, std::size_t end) {
+    for_each_chunk(triangles.size(), threads, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) {
             double corner[3][3];
             const bool known = triangles.load(i, [&](std::size_t k, std::size_t axis, Real x) { corner[k][axis] = x; });

@@ -43,6 +43,9 @@ namespace wive::WIVE_ISA {
 // exactly (triangle_watertight_float64.h), so that a hit lies no more than 3u M aside: 13u M in all with compressed
 // planes. A component smaller than 2^-30 of the longest is replaced by that, with its sign: along the
 // ray that moves a point by less than 2^-29 M, which the same slack covers.
+// From far away, slack of 16u O would make all boxes of a detail overlap. Where a triangle test is that much finer, the
+// ray starts for boxes where it comes nearest to the centre, o', found in double, and distances to boxes count from
+// there: O is then that of o', and 2^-28 of the origin's own O covers what double rounds, less than 2^-51 O.
 //
 // Real is the precision of the caller's rays and of the triangle test.
 template <Isa I>
@@ -58,12 +61,16 @@ struct RayFrame {
     alignas(16) float near_bias[4];
     alignas(16) float far_bias[4];
     Interval<Real> interval;
-    Real unscale;  // a power of two; t here = unscale * t of the caller's ray
+    Real unscale;    // a power of two; t here = unscale * t of the caller's ray
+    Real box_start;  // t where the ray starts for boxes
     // The rows of planes that the ray meets first and last on each axis, in planes from the node's first.
     std::uint32_t near_row[3], far_row[3];
     // The shift to the ray's octant in a lane of the order row, four bits per octant; farthest child first.
     std::uint32_t order_shift;
     unsigned longest_axis;
+
+    static constexpr float slack_factor = 0x1p-20f;
+    static constexpr float least_magnitude = 0x1p-100f;  // keeps the slack from vanishing if everything is tiny
 
     // Returns false if the ray hits nothing by rule: if its origin or direction is NaN or out of range, its direction
     // zero or its interval empty.
@@ -91,8 +98,7 @@ struct RayFrame {
         const Real near = caller_tmin * unscale, far = caller_tmax * unscale;
         interval = Interval<Real>::of(near, far);
 
-        constexpr float smallest_part = 0x1p-30f, slack_factor = 0x1p-20f;
-        constexpr float least_magnitude = 0x1p-100f;             // keeps the slack from vanishing if everything is tiny
+        constexpr float smallest_part = 0x1p-30f;
         const Float4 scaled = Float4::narrow(scaled_direction);  // signs are kept, even if a component becomes zero
         const Float4 relative = Float4::narrow(caller_origin - Real4::of(Float4::load(bvh.center)));
         const float magnitude = highest_lane(abs(relative)) + least_magnitude;
@@ -116,7 +122,40 @@ struct RayFrame {
         if (!scales_exactly(caller_tmin, caller_tmax, near, far))
             [[unlikely]]  // a call, so here, where no vector is live
             interval = scaled_limits(caller_tmin, caller_tmax, unscale);
+        box_start = 0;
+        if constexpr (std::is_same_v<Real, double>)
+            if (magnitude > bvh.far_away) [[unlikely]] {
+                bring_boxes_near(bvh);
+                interval.start_boxes_at(box_start);
+            }
         return true;
+    }
+
+    // Lets the ray start for boxes where it comes nearest to the centre, if that is much nearer. The interval's ends
+    // for boxes are the caller's to adapt.
+    [[gnu::noinline]] void bring_boxes_near(const BvhView& bvh) {
+        double from[3], distance = 0, nearest = 0, along = 0, squared = 0;
+        for (int axis = 0; axis < 3; ++axis) {
+            from[axis] = static_cast<double>(origin[axis]) - static_cast<double>(bvh.center[axis]);
+            const double way = direction[axis];
+            along -= from[axis] * way;
+            squared += way * way;
+            distance = std::fmax(distance, std::fabs(from[axis]));
+        }
+        const Real start = static_cast<Real>(along / squared);
+        for (int axis = 0; axis < 3; ++axis) {
+            from[axis] += static_cast<double>(start) * static_cast<double>(direction[axis]);
+            nearest = std::fmax(nearest, std::fabs(from[axis]));
+        }
+        if (!(nearest <= distance / 4)) return;
+        box_start = start;
+        const float magnitude = static_cast<float>(nearest + 0x1p-27 * distance) + least_magnitude;
+        for (int axis = 0; axis < 3; ++axis) {
+            const float to_origin = static_cast<float>(from[axis]) * rdir[axis];
+            const float slack = std::fabs(rdir[axis]) * (magnitude * slack_factor);
+            near_bias[axis] = -(to_origin + slack);
+            far_bias[axis] = slack - to_origin;
+        }
     }
 
     // Loads a ray whose direction is subnormal, or so long that the reciprocal of its power of two is.
@@ -130,6 +169,7 @@ struct RayFrame {
         if (!load(bvh, {o, d, &tmin, &tmax, 0, 0}, 0)) return false;
         unscale /= by;
         interval = scaled_limits(tmin, tmax, unscale);
+        if constexpr (std::is_same_v<Real, double>) interval.start_boxes_at(box_start);
         return true;
     }
 

@@ -140,15 +140,16 @@ private:
                (turn * distance <= max_width * extent * longest);
     }
 
-    // Returns false if a ray hits nothing by rule, or if the rays differ in octant or in scale, which would make the
-    // bounds loose.
+    // Returns false if a ray hits nothing by rule, if it starts elsewhere for boxes, or if the rays differ in octant or
+    // in scale, which would make the bounds loose.
     bool load(std::size_t first, const Origins& origins) {
         const Float4 infinity = Float4::all(std::numeric_limits<float>::infinity()), zero = Float4::all(0);
         Float4 low_rdir = infinity, high_rdir = zero - infinity;
         for (unsigned i = 0; i < packet_size; ++i) {
             Frame& ray = ray_[i];
             if (!ray.load(bvh_, rays_, first + i)) return false;
-            if ((ray.order_shift != ray_[0].order_shift) | (ray.unscale != ray_[0].unscale)) return false;
+            if ((ray.order_shift != ray_[0].order_shift) | (ray.unscale != ray_[0].unscale) | (ray.box_start != 0))
+                return false;
             assert(ray.is_finite());
             const Float4 rdir = Float4::load(ray.rdir);
             low_rdir = min(low_rdir, rdir);

@@ -1,11 +1,20 @@
 // The closest hit in exact mode.
 #pragma once
 
+#include <cmath>
+
 #include "core/layout.h"
 #include "traverse/exact_hit.h"
 #include "traverse/query.h"
 
 namespace wive::WIVE_ISA {
+
+// The distance to boxes at which a ray ends that starts for them at t = start: no t that rounds to tmax lies behind.
+// Without a start of their own, the slack of the boxes (frame.h) is larger than this rounding.
+inline float exact_box_tmax(float tmax, float start) {
+    const double t = tmax;
+    return float_above(t + std::fabs(t) * 0x1p-23 - static_cast<double>(start));
+}
 
 // t is in the caller's units, the float nearest to the exact value. Rounding preserves order except for making unequal
 // values equal, so equal floats are compared exactly, and the best hit's triangle is remembered for that.
@@ -24,9 +33,9 @@ struct ExactClosestHit {
     int lane = 0;
 
     // Takes a hit that is known to lie in the caller's interval. compare(block, lane): the sign of the exact t of this
-    // hit less that of another triangle. unscale: t in the frame's units / t in the caller's.
-    template <class Compare>
-    [[gnu::always_inline]] bool accept(const RoundedHit& hit, const Block& hit_block, int hit_lane, float unscale,
+    // hit less that of another triangle.
+    template <class Frame, class Compare>
+    [[gnu::always_inline]] bool accept(const RoundedHit& hit, const Block& hit_block, int hit_lane, const Frame& ray,
                                        const Compare& compare) {
         const auto hit_prim = static_cast<std::uint32_t>(hit_block.prim_at(hit_lane));
         if (prim != no_prim) {
@@ -44,7 +53,8 @@ struct ExactClosestHit {
         // float, infinite: then nearer hits are infinite as well, and no box that lies before the lowest float is
         // skipped.
         const float t = hit.t < lowest ? lowest : hit.t;
-        interval.end_at((t + 0x1p-148f) * unscale);
+        const float end = (t + 0x1p-148f) * ray.unscale;
+        interval.end_at(ray.box_start == 0 ? end : exact_box_tmax(end, ray.box_start));
         return false;
     }
     [[gnu::always_inline]] void write(const HitBatch<float>& hits, std::size_t i, float) const {

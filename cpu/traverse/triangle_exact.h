@@ -55,6 +55,12 @@ struct ExactFrame : AxisFrame<I> {
         const Float4 relative = Float4::load(this->origin) - Float4::load(bvh.center);
         const double magnitude = highest_lane(Float4::load(bvh.extent) + abs(relative));
         weight_bound = 97 * 0x1p-53 * magnitude * magnitude;  // 97: magnitude itself is rounded
+        if (highest_lane(abs(relative)) > bvh.far_away) [[unlikely]] {
+            this->bring_boxes_near(bvh);
+            if (this->box_start != 0)
+                this->interval = Interval<float>::of(-exact_box_tmax(-this->interval.tmin, -this->box_start),
+                                                     exact_box_tmax(this->interval.tmax, this->box_start));
+        }
         return true;
     }
 
@@ -200,7 +206,7 @@ private:
     template <class Block, class Query>
     [[gnu::always_inline]] bool accept(const Block& block, int lane, const RoundedHit& hit, Query& query) const {
         if constexpr (Query::in_order)
-            return query.accept(hit, block, lane, ray_.unscale, [&](const Block& other, int other_lane) {
+            return query.accept(hit, block, lane, ray_, [&](const Block& other, int other_lane) {
                 return compare_distances(ray_.caller_ray(), corners_of(block, lane), corners_of(other, other_lane));
             });
         else

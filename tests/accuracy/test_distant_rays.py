@@ -1,4 +1,4 @@
-"""float64 rays from far away hit what they hit from near by, and t is the distance from afar."""
+"""Rays from far away hit what they hit from near by, and t is the distance from afar."""
 
 import numpy as np
 import pytest
@@ -36,6 +36,31 @@ def test_rays_from_far_away_hit_what_they_hit_from_near_by(backend, accuracy, no
         np.testing.assert_array_equal(every.t[every.offsets[:-1]], hits.t)
         np.testing.assert_array_equal(every.prim[every.offsets[:-1]], hits.prim)
         assert (np.diff(every.t.reshape(-1, 2)) >= 0).all()
+
+
+@pytest.mark.parametrize("accuracy", ["fast", "watertight"])
+def test_float32_rays_from_far_away_are_not_rounded_once_more(backend, accuracy):
+    """Unmoved, rounding in the triangle test throws some past the sphere from 1e6 on, and most from 1e7."""
+    if backend == "warp" and accuracy == "fast":
+        pytest.skip("the same path as watertight, and kernels of its own to compile")
+    scene = wive.Scene(*sphere(4), backend=backend, accuracy=accuracy)
+    outwards = np.random.default_rng(8).standard_normal((300, 3)).astype(np.float32)
+    start = 2 / np.linalg.norm(outwards.astype(np.float64), axis=1)
+    near = scene.intersect(start[:, None] * outwards, -outwards)
+    for power in (14, 17, 20, 24, 30, 40):
+        rays = np.float32(2.0**power) * outwards, -outwards
+        hits = scene.intersect(*rays)
+        lost = 2.0 ** (power - 50)  # what float64 resolves of the origins, and some
+        np.testing.assert_allclose(hits.points(), near.points(), rtol=0, atol=1e-6 + lost)
+        np.testing.assert_allclose(hits.t, 2.0**power - start + near.t, rtol=1e-7)
+        assert (scene.count(*rays) == 2).all()
+        assert scene.occluded(*rays).all()
+        assert not scene.occluded(rays[0], outwards).any()
+        alone = scene.intersect(rays[0][:1], rays[1][:1])
+        np.testing.assert_array_equal(alone.uv, hits.uv[:1])
+        as_doubles = scene.intersect(rays[0].astype(np.float64), rays[1])
+        for name in ("t", "prim", "uv", "error_bound"):
+            np.testing.assert_array_equal(getattr(as_doubles, name), getattr(hits, name))
 
 
 @pytest.mark.parametrize("distance", [1e14, 1e15, 1e16, 1e17, 9e17])

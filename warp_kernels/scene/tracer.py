@@ -209,7 +209,7 @@ class WarpTracer:
 
     @functools.cached_property
     def _ball(self) -> Ball:
-        return Ball.around(self.bvh.bounds)
+        return Ball.around(self.bvh.bounds, self.bvh.far_distance)
 
     def _lanes(self, work: Work, rays: WarpRays) -> Lanes:
         return choose_lanes(work.lanes, len(rays), self.device != "cpu")

@@ -70,7 +70,7 @@ class CpuTracer:
 
     def intersect(self, rays: Rays, work: Work) -> tuple[Hits, Stats | None]:
         """Closest hits."""
-        arrays, near = self._traced(rays)
+        arrays, near = self._traced(rays, work)
         t, prim, uv, steps = self.bvh.intersect(
             self._kernels, *arrays, work.threads, work.in_flight, work.stats
         )
@@ -83,14 +83,14 @@ class CpuTracer:
 
     def occluded(self, rays: Rays, work: Work) -> tuple[Any, Stats | None]:
         """(n,) bool, whether anything is hit."""
-        arrays, _ = self._traced(rays)
+        arrays, _ = self._traced(rays, work)
         mask, steps = self.bvh.occluded(self._kernels, *arrays, work.threads, work.in_flight, work.stats)
         library = rays.library
         return library.from_numpy(mask), None if steps is None else stats_of(steps, library)
 
     def count(self, rays: Rays, work: Work) -> tuple[Any, Stats | None]:
         """(n,) int32, the number of hits."""
-        arrays, _ = self._traced(rays)
+        arrays, _ = self._traced(rays, work)
         counts, steps = self.bvh.count(
             self._kernels, *arrays, work.threads, work.in_flight, work.stats, touching=work.touching
         )
@@ -99,7 +99,7 @@ class CpuTracer:
 
     def intersect_all(self, rays: Rays, work: Work) -> tuple[AllHits, Stats | None]:
         """All hits."""
-        arrays, near = self._traced(rays)
+        arrays, near = self._traced(rays, work)
         options = work.threads, work.in_flight, work.stats, work.touching
         found = self.bvh.intersect_all(self._kernels, *arrays, *options, max_bytes=work.max_bytes)
         offsets, t, prim, uv, steps = found
@@ -135,14 +135,12 @@ class CpuTracer:
 
     @functools.cached_property
     def _ball(self) -> Ball:
-        return Ball.around(self.bvh.bounds)
+        return Ball.around(self.bvh.bounds, self.bvh.far_distance)
 
-    def _traced(self, rays: Rays) -> tuple[Traced, Moved | None]:
+    def _traced(self, rays: Rays, work: Work) -> tuple[Traced, Moved | None]:
         """The rays as the core takes them, and how far some were moved."""
         arrays = rays.numpy(self._real)
-        if arrays[0] is rays.origins and arrays[1] is rays.directions:
-            return arrays, None
-        near = moved(rays, arrays, self._real, self._ball)
+        near = moved(rays, arrays, self._real, self._ball, work.threads)
         return (arrays, None) if near is None else (near.arrays, near)
 
 

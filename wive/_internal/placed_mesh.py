@@ -82,11 +82,7 @@ class PlacedMesh:
         """The origins of rays, those far away moved along their rays to where the mesh is near."""
         if not self._ball.may_have_far(origins):
             return origins
-        steps = self._ball.steps(origins, directions, most=np.finfo(np.float64).max)
-        (ahead,) = np.nonzero(steps > 0)
-        near = origins.copy()
-        near[ahead] = self._ball.starts(origins[ahead], directions[ahead], steps[ahead])
-        return near
+        return self._ball.nearest_ahead(origins, directions)
 
     def rays(self, origins: Float64, directions: Float64) -> tuple[Floats, Floats]:
         """The rays in the scene's units and dtype."""

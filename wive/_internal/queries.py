@@ -74,8 +74,9 @@ class Queries:
 
         Results depend on none of `threads`, `in_flight` and `lanes`, nor on how rays are split into batches.
         A ray misses if its origin is NaN or infinite, its direction is NaN, infinite or zero, a number of it
-        is masked, or its tmin is above its tmax. Rays that are not given in float32 may start far away from a
-        float32 scene: they are brought near before they are rounded.
+        is masked, or its tmin is above its tmax. Rays may start far away from a float32 scene, which brings
+        them near in float64 first; not arrays of other libraries for Warp, and float32 rays not if the
+        accuracy is "exact", which takes them as they are.
 
         Raises ValueError or TypeError, in one line naming the argument; an option that is only for other
         backends than the scene's raises ValueError.
