@@ -61,8 +61,7 @@ struct RayFrame {
     alignas(16) float near_bias[4];
     alignas(16) float far_bias[4];
     Interval<Real> interval;
-    Real unscale;    // a power of two; t here = unscale * t of the caller's ray
-    Real box_start;  // t where the ray starts for boxes
+    Real unscale;  // a power of two; t here = unscale * t of the caller's ray
     // The rows of planes that the ray meets first and last on each axis, in planes from the node's first.
     std::uint32_t near_row[3], far_row[3];
     // The shift to the ray's octant in a lane of the order row, four bits per octant; farthest child first.
@@ -122,18 +121,15 @@ struct RayFrame {
         if (!scales_exactly(caller_tmin, caller_tmax, near, far))
             [[unlikely]]  // a call, so here, where no vector is live
             interval = scaled_limits(caller_tmin, caller_tmax, unscale);
-        box_start = 0;
         if constexpr (std::is_same_v<Real, double>)
-            if (magnitude > bvh.far_away) [[unlikely]] {
-                bring_boxes_near(bvh);
-                interval.start_boxes_at(box_start);
-            }
+            if (magnitude > bvh.far_away) [[unlikely]]
+                interval.start_boxes_at(bring_boxes_near(bvh));
         return true;
     }
 
-    // Lets the ray start for boxes where it comes nearest to the centre, if that is much nearer. The interval's ends
-    // for boxes are the caller's to adapt.
-    [[gnu::noinline]] void bring_boxes_near(const BvhView& bvh) {
+    // Lets the ray start for boxes where it comes nearest to the centre, if that is much nearer. Returns t there; the
+    // interval's ends for boxes are the caller's to adapt.
+    [[gnu::noinline]] Real bring_boxes_near(const BvhView& bvh) {
         double from[3], distance = 0, nearest = 0, along = 0, squared = 0;
         for (int axis = 0; axis < 3; ++axis) {
             from[axis] = static_cast<double>(origin[axis]) - static_cast<double>(bvh.center[axis]);
@@ -147,8 +143,7 @@ struct RayFrame {
             from[axis] += static_cast<double>(start) * static_cast<double>(direction[axis]);
             nearest = std::fmax(nearest, std::fabs(from[axis]));
         }
-        if (!(nearest <= distance / 4)) return;
-        box_start = start;
+        if (!(nearest <= distance / 4)) return 0;
         const float magnitude = static_cast<float>(nearest + 0x1p-27 * distance) + least_magnitude;
         for (int axis = 0; axis < 3; ++axis) {
             const float to_origin = static_cast<float>(from[axis]) * rdir[axis];
@@ -156,6 +151,13 @@ struct RayFrame {
             near_bias[axis] = -(to_origin + slack);
             far_bias[axis] = slack - to_origin;
         }
+        return start;
+    }
+
+    // Whether the ray starts elsewhere for boxes than for triangles.
+    [[gnu::always_inline]] bool has_box_start() const {
+        if constexpr (std::is_same_v<Real, double>) return interval.box_start != 0;
+        return false;
     }
 
     // Loads a ray whose direction is subnormal, or so long that the reciprocal of its power of two is.
@@ -168,8 +170,12 @@ struct RayFrame {
         (caller_direction * Real4::all(by)).store(d);
         if (!load(bvh, {o, d, &tmin, &tmax, 0, 0}, 0)) return false;
         unscale /= by;
-        interval = scaled_limits(tmin, tmax, unscale);
-        if constexpr (std::is_same_v<Real, double>) interval.start_boxes_at(box_start);
+        if constexpr (std::is_same_v<Real, double>) {
+            const double start = interval.box_start;
+            interval = scaled_limits(tmin, tmax, unscale);
+            interval.start_boxes_at(start);
+        } else
+            interval = scaled_limits(tmin, tmax, unscale);
         return true;
     }
 

@@ -148,7 +148,7 @@ private:
         for (unsigned i = 0; i < packet_size; ++i) {
             Frame& ray = ray_[i];
             if (!ray.load(bvh_, rays_, first + i)) return false;
-            if ((ray.order_shift != ray_[0].order_shift) | (ray.unscale != ray_[0].unscale) | (ray.box_start != 0))
+            if ((ray.order_shift != ray_[0].order_shift) | (ray.unscale != ray_[0].unscale) | ray.has_box_start())
                 return false;
             assert(ray.is_finite());
             const Float4 rdir = Float4::load(ray.rdir);

@@ -22,6 +22,7 @@ struct ExactFrame : AxisFrame<I> {
     double shear[2];      // the direction on axis[0] and axis[1] / that on axis[2]
     double inverse;       // 1 / the direction on axis[2]
     double weight_bound;  // no weight of any triangle in the tree is off by more
+    float box_start;      // t where the ray starts for boxes
 
     [[gnu::always_inline]] bool load(const BvhView& bvh, const RayBatch<float>& rays, std::size_t i) {
         // Read once: the arrays are the caller's, and another thread may write to them.
@@ -55,14 +56,16 @@ struct ExactFrame : AxisFrame<I> {
         const Float4 relative = Float4::load(this->origin) - Float4::load(bvh.center);
         const double magnitude = highest_lane(Float4::load(bvh.extent) + abs(relative));
         weight_bound = 97 * 0x1p-53 * magnitude * magnitude;  // 97: magnitude itself is rounded
+        box_start = 0;
         if (highest_lane(abs(relative)) > bvh.far_away) [[unlikely]] {
-            this->bring_boxes_near(bvh);
-            if (this->box_start != 0)
-                this->interval = Interval<float>::of(-exact_box_tmax(-this->interval.tmin, -this->box_start),
-                                                     exact_box_tmax(this->interval.tmax, this->box_start));
+            box_start = this->bring_boxes_near(bvh);
+            if (box_start != 0)
+                this->interval = Interval<float>::of(-exact_box_tmax(-this->interval.tmin, -box_start),
+                                                     exact_box_tmax(this->interval.tmax, box_start));
         }
         return true;
     }
+    bool has_box_start() const { return box_start != 0; }
 
     CallerRay caller_ray() const {
         return {{this->origin[0], this->origin[1], this->origin[2]},

@@ -77,6 +77,14 @@ def test_bench_inflight_counts_steps_and_measures_memory(bench: Callable[..., di
     assert all(row["steps"] > 1 for row in content["rows"])
 
 
+def test_bench_cliffs_compares_every_input(bench: Callable[..., dict[str, Any]]) -> None:
+    content = bench("cliffs", "--scenes", SCENE)
+    parts = {row["part"]: row for row in content["rows"]}
+    assert parts.keys() == {"scale", "distance", "plane", "doubt", "misses"}
+    assert all(row["ratio"] > 0 and row["ray_us"] > 0 for row in content["rows"])
+    assert 0.5 < parts["misses"]["missing"] < 1
+
+
 def test_bench_packets_measures_every_view(bench: Callable[..., dict[str, Any]]) -> None:
     content = bench("packets", "--scenes", SCENE, "--widths", "16,64")
     assert len(content["rows"]) == 5 * 2 * 2  # distances, widths, queries
