@@ -18,6 +18,8 @@ except ImportError as error:
     ) from error
 
 from wive import embreex, trimesh
+from wive._internal.thread_setting import set_by_environment as _set_by_environment
+from wive._internal.thread_setting import set_threads
 from wive.all_hits import AllHits
 from wive.backend import Backend, backends
 from wive.camera import Camera
@@ -47,8 +49,11 @@ __all__ = [
     "load",
     "load_mesh",
     "render",
+    "set_threads",
     "trimesh",
 ]
+
+_set_by_environment()
 
 
 def __dir__() -> list[str]:

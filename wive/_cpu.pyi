@@ -30,6 +30,18 @@ def avx512_form() -> Literal["full", "half"]:
     is none of "full", "half" and "race".
     """
 
+def usable_cores(root: str = "") -> int:
+    """The cores that this process may use, by its affinity and the CPU quotas of its control groups.
+
+    root: a folder that holds proc and sys, for tests.
+    """
+
+def thread_count(requested: int = 0) -> int:
+    """The threads of a call that begins now; requested: 0 is the number set, or one per core not in use."""
+
+def set_thread_count(count: int) -> None:
+    """Set the threads of calls that ask for 0; 0 is one per core."""
+
 def available_memory(root: str = "") -> int:
     """Bytes that this process can still fill, the system's and its control groups' limits considered.
 

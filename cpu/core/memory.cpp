@@ -9,6 +9,8 @@
 #include <sstream>
 #include <string_view>
 
+#include "core/control_groups.h"
+
 #if defined(__linux__)
 #include <sys/resource.h>
 #endif
@@ -56,32 +58,11 @@ std::size_t left_in(const std::string& folder, const GroupFiles& files) {
     return limit - std::min(limit, kept);
 }
 
-// The least that a group and the groups around it leave. In a container its path may be that of the host, where only
-// `mount` itself exists.
-std::size_t left_in_all(const std::string& mount, std::string path, const GroupFiles& files) {
-    std::size_t left = left_in(mount, files);
-    for (; path.size() > 1 && path.front() == '/'; path.erase(path.rfind('/')))
-        left = std::min(left, left_in(mount + path, files));
-    return left;
-}
-
-bool has_memory(const std::string& controllers) {
-    std::istringstream names(controllers);
-    for (std::string name; std::getline(names, name, ',');)
-        if (name == "memory") return true;
-    return false;
-}
-
 std::size_t left_in_groups(const std::string& root) {
-    const std::string mount = root + "/sys/fs/cgroup";
     std::size_t left = unlimited;
-    std::ifstream groups(root + "/proc/self/cgroup");
-    // A line is "number:controllers:path"; version 2 has no controllers.
-    for (std::string number, controllers, path;
-         std::getline(groups, number, ':') && std::getline(groups, controllers, ':') && std::getline(groups, path);) {
-        if (controllers.empty()) left = std::min(left, left_in_all(mount, path, version_2));
-        if (has_memory(controllers)) left = std::min(left, left_in_all(mount + "/memory", path, version_1));
-    }
+    for_each_group(root, "memory", [&](const std::string& folder, GroupVersion version) {
+        left = std::min(left, left_in(folder, version == GroupVersion::two ? version_2 : version_1));
+    });
     return left;
 }
 

@@ -15,22 +15,10 @@
 
 #include "core/default_floats.h"
 #include "core/memory.h"
-
-#if defined(__linux__)
-#include <sched.h>
-#endif
+#include "core/poll.h"
+#include "core/thread_count.h"
 
 namespace wive {
-
-// The number of threads to use: `requested`, or if that is 0, one per core that this process may run on.
-inline unsigned thread_count(unsigned requested) {
-    if (requested > 0) return requested;
-#if defined(__linux__)
-    cpu_set_t cores;
-    if (sched_getaffinity(0, sizeof(cores), &cores) == 0) return static_cast<unsigned>(CPU_COUNT(&cores));
-#endif
-    return std::max(1u, std::thread::hardware_concurrency());
-}
 
 // Yields the core until ready(), for 200 us at most. Most waits here are shorter than the system takes to wake a thread
 // that sleeps on a condition variable, on virtual cores above all.
@@ -46,7 +34,7 @@ void yield_until(const Ready& ready) {
 // the calling thread does the work alone.
 class Threads {
 public:
-    explicit Threads(unsigned count) : count_(count) { prepare_to_throw(); }
+    explicit Threads(unsigned count) : count_(count), in_use_(count) { prepare_to_throw(); }
     Threads(const Threads&) = delete;
     Threads& operator=(const Threads&) = delete;
     ~Threads() {
@@ -58,8 +46,8 @@ public:
         for (std::thread& helper : helpers_) helper.join();
     }
 
-    // Calls work(i) once for every i in [0, count). If calls throw, the first exception is thrown again here, after all
-    // threads have stopped.
+    // Calls work(i) once for every i in [0, count), and asks this thread's caller now and then whether to go on
+    // (poll.h). If calls throw, the first exception is thrown again here, after all threads have stopped.
     template <class Work>
     void for_each(std::size_t count, const Work& work) {
         Job job = {count, [](const void* w, std::size_t i) { (*static_cast<const Work*>(w))(i); }, &work};
@@ -81,7 +69,8 @@ private:
 
         void run() {
             try {
-                for (std::size_t i; (i = next.fetch_add(1, std::memory_order_relaxed)) < count;) call(work, i);
+                for (std::size_t i; (i = next.fetch_add(1, std::memory_order_relaxed)) < count; poll_caller())
+                    call(work, i);
             } catch (...) {
                 if (!failed.exchange(true)) failure = std::current_exception();
                 next.store(count, std::memory_order_relaxed);
@@ -150,6 +139,7 @@ private:
     }
 
     const unsigned count_;
+    const ThreadsInUse in_use_;
     std::vector<std::thread> helpers_;
     std::mutex mutex_;
     std::condition_variable wake_, idle_;

@@ -4,6 +4,8 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "core/poll.h"
+
 namespace wive {
 
 // Rays in flat arrays. tmin and tmax have one value for all rays (stride 0) or one per ray (stride 1).
@@ -32,15 +34,18 @@ struct HitBatch {
     HitList<Real>* found = nullptr;  // all-hits queries: one list per worker thread of the batch
 };
 
-// Hands out the rays of a batch to the threads that trace it, one run of consecutive rays at a time.
+// Hands out the rays of a batch to the threads that trace it, one run of consecutive rays at a time. Between runs, the
+// caller is asked whether to go on (poll.h), which may throw.
 struct RaySource {
     std::size_t* next;  // shared by the threads: the first ray not yet handed out
     std::size_t count, run;
 
     [[gnu::always_inline]] bool take(std::size_t& begin, std::size_t& end) const {
         begin = __atomic_fetch_add(next, run, __ATOMIC_RELAXED);
+        if (begin >= count) return false;
         end = count - begin < run ? count : begin + run;
-        return begin < count;
+        poll_caller();
+        return true;
     }
 };
 

@@ -127,7 +127,17 @@ py::array_t<float> copy(const std::array<float, n>& values) {
     return py::array_t<float>(static_cast<py::ssize_t>(n), values.data());
 }
 
+unsigned long signal_thread = 0;
+
 }  // namespace
+
+bool handles_signals() { return PyThread_get_thread_ident() == signal_thread; }
+
+void check_signals() {
+    const py::gil_scoped_acquire lock;
+    if (PyErr_CheckSignals() != 0) throw py::error_already_set();
+}
+
 }  // namespace wive
 
 PYBIND11_MODULE(_cpu, m, pybind11::mod_gil_not_used()) {
@@ -145,7 +155,11 @@ PYBIND11_MODULE(_cpu, m, pybind11::mod_gil_not_used()) {
             PyErr_SetString(PyExc_MemoryError, "not enough memory");
         }
     });
+    signal_thread = py::module_::import("threading").attr("main_thread")().attr("ident").cast<unsigned long>();
     m.def("available_memory", &available_memory, py::arg("root") = "");
+    m.def("usable_cores", &usable_cores, py::arg("root") = "");
+    m.def("thread_count", &thread_count, py::arg("requested") = 0);
+    m.def("set_thread_count", &set_thread_count, py::arg("count"));
     m.def("expect_memory", &expect_memory, py::arg("bytes"));
     m.attr("compiler") = compiler_name;
     m.attr("exact_source") = exact_source;

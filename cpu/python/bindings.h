@@ -16,6 +16,7 @@
 
 #include "build/builder.h"
 #include "core/default_floats.h"
+#include "core/poll.h"
 #include "kernels/dispatch.h"
 
 namespace wive {
@@ -54,9 +55,17 @@ void expect_shape(const Array<T>& array, py::ssize_t columns, const char* messag
     expect(array.ndim() == 2 && array.shape(1) == columns, message);
 }
 
-// Releases the interpreter lock, and computes in the core's own floating-point environment meanwhile.
+// Throws Python's exception if a signal's handler raised one: KeyboardInterrupt, usually.
+void check_signals();
+
+// Whether this is the thread in which Python handles signals.
+bool handles_signals();
+
+// Releases the interpreter lock, and computes in the core's own floating-point environment meanwhile. Ctrl-C ends the
+// work, if it is shared out by Threads.
 struct Released {
     py::gil_scoped_release release;
+    Poll poll{handles_signals() ? &check_signals : nullptr};
     DefaultFloats floats;
 };
 

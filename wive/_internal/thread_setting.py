@@ -1,0 +1,30 @@
+"""How many threads calls use that don't say it."""
+
+import os
+
+from wive import _cpu
+from wive._internal import arguments
+
+VARIABLE = "WIVE_NUM_THREADS"
+
+
+def set_threads(count: int | None) -> None:
+    """Set how many threads calls use that don't say it by `threads=`, in all of this process.
+
+    None is one per core that the process may use, by its affinity and by the CPU quota of its container, and
+    that no other call of it uses at that time: Python threads that trace at once share the cores. At the
+    start it is the number in the environment variable WIVE_NUM_THREADS, if that is set, else None.
+
+    Raises ValueError if count is less than 1, TypeError if it is no integer.
+    """
+    _cpu.set_thread_count(arguments.threads(count))
+
+
+def set_by_environment() -> None:
+    """Take the number in WIVE_NUM_THREADS; ValueError if it is none."""
+    text = os.environ.get(VARIABLE, "").strip()
+    if not text:
+        return
+    if not text.isascii() or not text.isdigit() or int(text) < 1:
+        raise ValueError(f"{VARIABLE} must be a positive integer, got {text!r:.60}: change it or unset it")
+    set_threads(int(text))
