@@ -23,10 +23,11 @@ from wive._internal.thread_setting import set_threads
 from wive.all_hits import AllHits
 from wive.backend import Backend, backends
 from wive.camera import Camera
+from wive.colors import load_colors
 from wive.geoms import Geoms
 from wive.hits import Hits, Stats
 from wive.meshfile import load_mesh
-from wive.rendering import render
+from wive.rendering import render, write_picture
 from wive.scene import Scene, load
 from wive.sensors import EquirectangularCamera, OrthographicCamera, PinholeCamera, SpinningLidar
 
@@ -47,10 +48,12 @@ __all__ = [
     "backends",
     "embreex",
     "load",
+    "load_colors",
     "load_mesh",
     "render",
     "set_threads",
     "trimesh",
+    "write_picture",
 ]
 
 _set_by_environment()

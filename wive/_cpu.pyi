@@ -230,18 +230,21 @@ class Bvh:
         row_end: int,
         samples: int,
         bounces: int,
-        albedo: Literal["gray", "normals"],
+        albedo: Literal["gray", "normals", "faces", "vertices"],
         seed: int = 0,
         threads: int = 0,
         in_flight: int = 0,
         tracer: tuple[int, int] | None = None,
         check: bool = True,
+        colours: NDArray[np.float32] | None = None,
+        light: NDArray[np.float32] | None = None,
     ) -> int:
         """Path-trace rows [row_begin, row_end) of image (height,width,3) in place; returns the rays traced.
 
         camera (4,3): eye, then the vectors from the eye to the picture's centre, from its centre to the right
-        edge's middle, and from its centre to the top edge's middle. Linear radiance under a white sky of
-        radiance 1. Random numbers come from (pixel, sample, bounce) alone, so a picture does not depend on
+        edge's middle, and from its centre to the top edge's middle. colours: (f,3) or (v,3), with albedo
+        "faces" or "vertices". light (5,3): up, radiance of the sky at the horizon and straight up, direction to
+        the sun, radiance of a white surface that faces the sun; None is a white sky of radiance 1. Random numbers come from (pixel, sample, bounce) alone, so a picture does not depend on
         threads or kernel. tracer: addresses of a C function that traces in the kernel's place and of its
         context (ForeignTracer in cpu/render/render.h), for comparisons. check: check the mesh first, whose
         arrays the caller may have changed since the tree was built; once per picture is enough.

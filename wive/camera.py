@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
@@ -13,10 +14,14 @@ from wive._internal.picture_rays import perspective, size_of
 from wive._internal.precision import Floats
 from wive._internal.scalars import MOST_COUNT, shown
 
+if TYPE_CHECKING:
+    from wive.scene import Scene
+
 # A mesh is flat, with up along its thinnest axis, if it is this much thinner on that axis than on the others.
 FLATNESS = 0.4
 # From the mesh to the eye: to the right, in front, above.
 VIEWPOINT = (0.55, 1.0, 0.6)
+VIEWPOINT_OF_FLAT = (0.4, 1.0, 0.85)
 # The fraction of the picture that a framed mesh fills.
 FILLED = 0.94
 # The sine of the smallest angle between the view and `up`.
@@ -65,27 +70,29 @@ class Camera:
         Raises ValueError or TypeError that names the argument of no sense.
         """
         low, high = arguments.bounds(bounds, LARGEST)
-        fov, aspect = _field_of_view(fov), arguments.real("aspect", aspect)
-        if aspect <= 0:
-            raise ValueError(f"aspect must be above 0, got {aspect:g}")
-        up_vector = _flat_axis(high - low) if up is None else _direction("up", up)
-        right, front = _ground_axes(up_vector)
-        viewpoint = VIEWPOINT @ np.stack([right, front, up_vector])
-        centre = (low + high) / 2
-        forward, to_right, to_top = cls(viewpoint, np.zeros(3), up_vector, fov)._axes()
-
         corners = np.stack(np.meshgrid(*np.stack([low, high], axis=1), indexing="ij"), axis=-1).reshape(-1, 3)
-        tangent = FILLED * math.tan(math.radians(fov) / 2)
-        if not (tangent > 1 / LARGEST and 1 / LARGEST < tangent * aspect < LARGEST):
-            raise ValueError(f"fov and aspect leave no picture, got fov {fov:g} and aspect {aspect:g}")
-        across, back_across = _squeeze(corners - centre, forward, to_right, tangent * aspect)
-        upward, back_upward = _squeeze(corners - centre, forward, to_top, tangent)
-        # Not so close that eye and target are one in float32.
-        back = max(back_across, back_upward, NEAREST * float(np.max(abs(centre)))) or 1.0
-        if back > LARGEST:
-            raise ValueError(f"fov and aspect must be larger for these bounds, got {fov:g} and {aspect:g}")
-        eye = centre + across * to_right + upward * to_top - back * forward
-        return cls(eye, eye + back * forward, up_vector, fov)
+        return framing_points(corners, up, fov, aspect)
+
+    @classmethod
+    def showing(
+        cls, scene: Scene, up: ArrayLike | None = None, fov: float | None = None, aspect: float = 16 / 9
+    ) -> Camera:
+        """The camera that `wive.render` takes by default: where most of the scene's front sides is seen.
+
+        It frames the scene from outside as `framing` does, or stands in the room that the scene is: if from
+        there more of the sides that normals point to is seen. Surfaces and eyes are sampled, in tenths of a
+        second, the same at each call.
+
+        Arguments:
+            up: (3,); None is as for `framing`; in rooms y, or z if most level surfaces face it.
+            fov: vertical, in degrees; None is 40 outside and 60 in rooms.
+            aspect: the picture's width divided by its height.
+
+        Raises ValueError or TypeError that names the argument of no sense, or if nothing can be hit.
+        """
+        from wive._internal.pictures.viewpoint import default_camera
+
+        return default_camera(scene, up, fov, aspect)
 
     def frame(self, width: int, height: int) -> NDArray[np.float32]:
         """(4,3) float32: the eye, and the vectors that span the picture.
@@ -124,6 +131,36 @@ class Camera:
         return view_axes(self.eye, self.target, self.up)
 
 
+def framing_points(
+    points: NDArray[np.float64], up: ArrayLike | None, fov: float, aspect: float
+) -> Camera:
+    """`Camera.framing` for points (n,3)."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    fov, aspect = _field_of_view(fov), arguments.real("aspect", aspect)
+    if aspect <= 0:
+        raise ValueError(f"aspect must be above 0, got {aspect:g}")
+    up_vector = _flat_axis(high - low) if up is None else unit_vector("up", up)
+    right, front = ground_axes(up_vector)
+    axes = np.stack([right, front, up_vector])
+    across_ground, into_ground, height = np.ptp((points - low) @ axes.T, axis=0)
+    is_flat = height < FLATNESS * min(across_ground, into_ground)
+    viewpoint = (VIEWPOINT_OF_FLAT if is_flat else VIEWPOINT) @ axes
+    centre = (low + high) / 2
+    forward, to_right, to_top = Camera(viewpoint, np.zeros(3), up_vector, fov)._axes()
+
+    tangent = FILLED * math.tan(math.radians(fov) / 2)
+    if not (tangent > 1 / LARGEST and 1 / LARGEST < tangent * aspect < LARGEST):
+        raise ValueError(f"fov and aspect leave no picture, got fov {fov:g} and aspect {aspect:g}")
+    across, back_across = _squeeze(points - centre, forward, to_right, tangent * aspect)
+    upward, back_upward = _squeeze(points - centre, forward, to_top, tangent)
+    # Not so close that eye and target are one in float32.
+    back = max(back_across, back_upward, NEAREST * float(np.max(abs(centre)))) or 1.0
+    if back > LARGEST:
+        raise ValueError(f"fov and aspect must be larger for these bounds, got {fov:g} and {aspect:g}")
+    eye = centre + across * to_right + upward * to_top - back * forward
+    return Camera(eye, eye + back * forward, up_vector, fov)
+
+
 def view_axes(eye: ArrayLike, target: ArrayLike, up: ArrayLike) -> NDArray[np.float64]:
     """(3,3) unit vectors of a view: forward, right, top."""
     ends = arguments.vector("eye", eye), arguments.vector("target", target)
@@ -133,7 +170,7 @@ def view_axes(eye: ArrayLike, target: ArrayLike, up: ArrayLike) -> NDArray[np.fl
     if (ends[0] == ends[1]).all():
         raise ValueError(f"eye and target must differ, got {shown(eye)} for both")
     forward = _unit(ends[1] - ends[0])
-    right = np.cross(forward, _direction("up", up))
+    right = np.cross(forward, unit_vector("up", up))
     if np.linalg.norm(right) <= SMALLEST_ANGLE:
         raise ValueError(f"up must not be zero or along the view, got {shown(up)}")
     right /= np.linalg.norm(right)
@@ -147,7 +184,7 @@ def _field_of_view(fov: float) -> float:
     return degrees
 
 
-def _direction(name: str, value: ArrayLike) -> NDArray[np.float64]:
+def unit_vector(name: str, value: ArrayLike) -> NDArray[np.float64]:
     """A unit vector along `value`."""
     vector = arguments.vector(name, value)
     if not vector.any():
@@ -182,7 +219,7 @@ def _flat_axis(extent: NDArray[np.float64]) -> NDArray[np.float64]:
     return axis
 
 
-def _ground_axes(up: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def ground_axes(up: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Unit vectors to the right and towards the viewer: x and z if up is y, x and -y if up is z."""
     across = np.eye(3)[1 if abs(up[0]) == np.max(abs(up)) else 0]
     front = np.cross(across, up)

@@ -10,7 +10,8 @@ from typing import NoReturn
 
 import wive
 from wive._internal import commands
-from wive._internal.picture import ALBEDOS, Settings
+from wive._internal.picture import ALBEDOS, SHADINGS, SKIES, Settings
+from wive._internal.pictures.image_files import FORMATS
 from wive.backend import CPU_BACKENDS, WARP
 
 BAD_INPUT = 2
@@ -81,12 +82,25 @@ def _parser() -> argparse.ArgumentParser:
 def _add_render(subparsers: "argparse._SubParsersAction[_Parser]") -> None:
     parser = subparsers.add_parser(
         "render",
-        help="path-trace a picture of a mesh",
-        description="Path-trace a picture of a mesh: diffuse surfaces under a white sky.",
+        help="make a picture of a mesh",
+        description="Make a picture of a mesh: path-traced by daylight, or by ambient occlusion if the camera "
+        "stands inside.",
         formatter_class=_Defaults,
     )
     parser.add_argument("mesh", nargs="?", metavar="MESH", help="mesh file; default: real terrain")
-    parser.add_argument("-o", "--output", default="wive.png", metavar="PNG", help="picture to write")
+    parser.add_argument(
+        "-o",
+        "--output",
+        default="wive.png",
+        metavar="FILE",
+        help=f"picture to write: {', '.join(FORMATS)}",
+    )
+    parser.add_argument(
+        "--shading",
+        choices=SHADINGS,
+        default=Settings.shading,
+        help="auto is path, or ao if the camera stands inside or no light gets in",
+    )
     parser.add_argument("--width", type=int, default=Settings.width, help="pixels")
     parser.add_argument("--height", type=int, default=Settings.height, help="pixels")
     parser.add_argument("--spp", type=int, default=Settings.spp, help="samples per pixel")
@@ -94,8 +108,22 @@ def _add_render(subparsers: "argparse._SubParsersAction[_Parser]") -> None:
         "--bounces", type=int, default=Settings.bounces, help="diffuse bounces after which a path ends"
     )
     parser.add_argument(
-        "--albedo", choices=ALBEDOS, help="surface colour; default: gray, and normals for the terrain"
+        "--albedo", choices=("file", *ALBEDOS), default="file", help="surface colour; file: those of the file"
     )
+    parser.add_argument(
+        "--sky", choices=SKIES, default=Settings.sky, help="light of paths; day has a sun on the left"
+    )
+    parser.add_argument(
+        "--sun", type=float, nargs=3, metavar=("X", "Y", "Z"), help="direction towards the sun, in any sky"
+    )
+    parser.add_argument(
+        "--exposure",
+        type=_stops,
+        default=Settings.exposure,
+        metavar="STOPS",
+        help="powers of two by which the picture is brighter, or auto",
+    )
+    parser.add_argument("--reach", type=float, help="distance from which surfaces do not occlude, of ao")
     for name, meaning in (
         ("eye", "where the camera is"),
         ("target", "what is in the picture's middle"),
@@ -106,12 +134,19 @@ def _add_render(subparsers: "argparse._SubParsersAction[_Parser]") -> None:
             type=float,
             nargs=3,
             metavar=("X", "Y", "Z"),
-            help=f"{meaning}; default: frames the mesh",
+            help=f"{meaning}; default: shows most of the mesh",
         )
-    parser.add_argument("--fov", type=float, help="vertical field of view in degrees; default: 40")
+    parser.add_argument("--fov", type=float, help="vertical field of view in degrees; default: 40, in rooms 60")
     parser.add_argument("--seed", type=int, default=Settings.seed, help="of the random numbers")
     _add_scene_options(parser)
     parser.set_defaults(run=commands.render_picture)
+
+
+def _stops(text: str) -> float | str:
+    try:
+        return float(text)
+    except ValueError:
+        return text  # "auto", or refused by its name
 
 
 def _add_trace(subparsers: "argparse._SubParsersAction[_Parser]") -> None:

@@ -59,7 +59,7 @@ def load_mesh(
     Each message is one line that names the file.
     """
     real = real_named(dtype)
-    name, folder, data = _content(source)
+    name, folder, data = content_of(source)
     kind = kind_of(data, name, file_type)
     if not data:
         raise ValueError(f"{name}: is empty")
@@ -70,7 +70,7 @@ def load_mesh(
         return _checked(_read(kind, data, name, folder, real), name, real)
 
 
-def _content(source: MeshSource) -> tuple[str, str | None, bytes]:
+def content_of(source: MeshSource) -> tuple[str, str | None, bytes]:
     """Name for errors, folder if the file has one, content."""
     if isinstance(source, str | os.PathLike):
         path = check_input(source)

@@ -1,122 +1,223 @@
-"""Pictures: path tracing in bands of rows, and PNG files of them."""
+"""Pictures of scenes."""
 
 from __future__ import annotations
 
-import io
-from collections.abc import Iterable, Iterator
-from typing import Literal
+from collections.abc import Callable, Iterator
+from typing import Literal, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from wive import _cpu
 from wive._internal import arguments
-from wive._internal.files import PathLike, atomic_write, check_output
-from wive._internal.picture import Image, Settings
+from wive._internal.picture import Image, Look, Settings, ShadingOption, SkyOption
+from wive._internal.pictures.albedo import Albedo, albedo_of
+from wive._internal.pictures.daylight import light_of, up_of_frame
+from wive._internal.pictures.shades import AmbientOcclusion, Headlight, NormalColours, render_depth
+from wive._internal.pictures.viewpoint import default_camera, reaches_sky, stands_inside
+from wive._internal.pictures.image_files import write_picture as write_picture
+from wive._internal.pictures.image_files import write_png as write_png
 from wive._internal.progress import progress_bar
-from wive.camera import Camera
+from wive.camera import Camera, unit_vector
 from wive.scene import Scene
 from wive.sensors import PinholeCamera
 
 # Paths per band: some tenths of a second, so that the bar moves; Ctrl-C takes effect between bands.
 BAND_PATHS = 300_000
 CUDA_BAND_PATHS = 1 << 20
+EXPOSABLE = "path", "ao", "headlight"
+# Brightness of the tenth brightest part of a picture with automatic exposure.
+EXPOSED = 0.7
+# Of the mean distance from an eye inside to what surrounds it: the reach of ambient occlusion there.
+INDOOR_REACH = 1.3
 
 
 def render(
     scene: Scene,
     camera: Camera | PinholeCamera | None = None,
     *,
+    shading: ShadingOption = "auto",
     width: int = 1280,
     height: int = 720,
     spp: int = 32,
     bounces: int = 8,
-    albedo: Literal["gray", "normals"] = "gray",
+    albedo: Literal["gray", "normals"] | ArrayLike | None = None,
+    sky: SkyOption = "day",
+    sun: ArrayLike | None = None,
+    exposure: float | Literal["auto"] = 0.0,
+    reach: float | None = None,
     seed: int = 0,
     threads: int | None = None,
     progress: bool = False,
 ) -> Image:
-    """Path-trace a picture of diffuse surfaces under a white sky of radiance 1.
+    """A picture of the scene.
 
     Arguments:
-        camera: None frames the whole scene.
+        camera: None is `Camera.showing(scene)`: it frames the scene from outside, or stands in the room that
+            the scene is.
+        shading: "path", path tracing of diffuse surfaces under the sky; "ao", ambient occlusion; "headlight",
+            the cosine between view and normal; "normals", (normal + 1) / 2; "depth", along the camera's axis.
+            "auto" is "path", but "ao" where that would be dark or fail: the camera stands inside, no path
+            reaches the sky, or the scene is float64.
         width, height: in pixels.
-        spp: samples (paths) per pixel.
+        spp: samples per pixel: paths, or rays of ambient occlusion.
         bounces: diffuse bounces after which a path ends.
-        albedo: "gray", or "normals" for surfaces coloured by their normal.
+        albedo: what surfaces reflect: linear colours from 0 to 1, (v,3) per vertex, (f,3) per triangle or (3,)
+            for all, such as `load_colors` returns; or uint8, sRGB, as trimesh has them. If there are as many
+            vertices as triangles, (f,1,3) is per triangle. "gray" is 0.6, "normals" coloured by normal. None is
+            gray in "path", white in "ao" and "headlight". Of no use for "normals" and "depth".
+        sky: "day", blue with a sun; "cloudy"; "white", of radiance 1 everywhere; "black". For "path".
+        sun: (3,) direction towards the sun, under any sky; None is on the left of the camera by day.
+        exposure: stops, powers of two by which the picture is brighter; "auto" makes most of it visible. For
+            "path", "ao" and "headlight".
+        reach: for "ao": the distance from which on a surface occludes nothing; one at half of it occludes by
+            half. None is inf, or if the camera stands inside, in proportion to the room.
         seed: another seed gives another picture of the same noise level. Random numbers come from (seed,
             pixel, sample, bounce) alone, so the picture depends on neither `threads` nor the scene's backend.
         threads: how many to use; None is every core. For CPU backends.
-        progress: show a progress bar on stderr (needs tqdm).
+        progress: show a progress bar (needs tqdm).
 
-    Returns (height, width, 3) float32 linear radiance, top row first. Raises ValueError or TypeError that
-    names a bad argument, such as a float64 scene: only float32 scenes are rendered.
+    Returns (height, width, 3) float32 linear radiance, top row first; of "normals" colours; of "depth"
+    (height, width) float32, inf if nothing is there. `write_picture` writes them to files.
+
+    Raises ValueError or TypeError that names a bad argument, such as a float64 scene for "path".
+
+    >>> wive.write_picture("room.png", wive.render(scene, shading="ao"))
     """
     settings = Settings(
-        width=width, height=height, spp=spp, bounces=bounces, albedo=albedo, seed=seed, threads=threads
+        shading=shading,
+        width=width,
+        height=height,
+        spp=spp,
+        bounces=bounces,
+        albedo=albedo,
+        sky=sky,
+        sun=sun,
+        exposure=exposure,
+        reach=reach,
+        seed=seed,
+        threads=threads,
     )
-    return render_counted(scene, camera, settings, progress=arguments.flag("progress", progress))[0]
+    return render_counted(scene, camera, settings, progress=arguments.flag("progress", progress)).image
+
+
+class Picture(NamedTuple):
+    """A picture, how it was shaded, and how many rays were traced for it."""
+
+    image: Image
+    shading: str
+    rays: int
 
 
 def render_counted(
     scene: Scene, camera: Camera | PinholeCamera | None, settings: Settings, *, progress: bool
-) -> tuple[Image, int]:
-    """The picture that `render` returns, and how many rays were traced for it."""
+) -> Picture:
+    """The picture that `render` returns."""
     if not isinstance(scene, Scene):
         raise TypeError(f"scene must be a wive.Scene, got {type(scene).__name__}")
     if not (camera is None or isinstance(camera, Camera | PinholeCamera)):
         raise TypeError(
-            "camera must be a wive.Camera or wive.PinholeCamera, or None to frame the scene, "
+            "camera must be a wive.Camera or wive.PinholeCamera, or None for one that shows the scene, "
             f"got {type(camera).__name__}"
         )
-    if scene.precision != "float32":
+    if settings.shading == "path" and scene.precision != "float32":
         raise ValueError(
-            "scene must be of float32 vertices to be rendered, got float64: "
+            "scene must be of float32 vertices to be path-traced, got float64: use another shading, or "
             "make one with (vertices - vertices.mean(axis=0)).astype(np.float32)"
         )
+    scene = scene._at_rest()  # one picture shows one shape, whatever refits happen meanwhile
+    arguments.refuse_lacking(scene.backend, scene._tracer.lacks, {"threads": settings.threads})
+    albedo = albedo_of(settings.albedo, len(scene), len(scene.vertices))
     width, height = settings.width, settings.height
-    if camera is None:
-        camera = Camera.framing(scene.bounds, aspect=width / height)
-    frame = camera.frame(width, height)
+    channels = () if settings.shading == "depth" else (3,)
     _cpu.expect_memory(height * width * 3 * np.dtype(np.float32).itemsize)
-    image = np.zeros((height, width, 3), np.float32)
-    tracer = scene._tracer  # one picture shows one shape, whatever refits happen meanwhile
-    arguments.refuse_lacking(tracer.backend, tracer.lacks, {"threads": settings.threads})
-    render_rows = tracer.rows_renderer(frame, image, settings)
+    image = np.zeros((height, width, *channels), np.float32)
+    if camera is None:
+        camera = default_camera(scene, aspect=width / height)
+    frame = camera._frame(width, height)
+    shading, reach = _resolved(scene, frame, settings)
+    title = "rendering"
+    if shading == "path":
+        look = _look(settings, albedo, frame, camera)
+        with progress_bar(height, "row", title, show=progress) as advance:
+            rays = _trace_paths(scene, frame.astype(np.float32), image, look, advance)
+    else:
+        with progress_bar(height, "row", title, show=progress) as advance:
+            rays = _shade(scene, frame, image, shading, albedo, reach, settings, advance)
+    if shading in EXPOSABLE:
+        _expose(image, settings.exposure)
+    return Picture(image, shading, rays)
+
+
+def _resolved(scene: Scene, frame: NDArray[np.float64], settings: Settings) -> tuple[str, float]:
+    """The shading that "auto" means, and the reach of ambient occlusion that None means."""
+    shading, reach = settings.shading, settings.reach
+    if shading not in ("auto", "ao") or (shading == "ao" and reach is not None):
+        return shading, np.inf if reach is None else reach
+    inside, around = stands_inside(scene, frame[0])
+    if reach is None:
+        reach = INDOOR_REACH * around if inside else np.inf
+    if shading == "auto":
+        is_dark = inside or scene.precision != "float32" or not reaches_sky(scene, frame, settings.bounces)
+        shading = "ao" if is_dark else "path"
+    return shading, reach
+
+
+def _shade(
+    scene: Scene,
+    frame: NDArray[np.float64],
+    image: Image,
+    shading: str,
+    albedo: Albedo,
+    reach: float,
+    settings: Settings,
+    advance: Callable[[float], object],
+) -> int:
+    """Render by the scene's queries."""
+    spp, threads = settings.spp, settings.threads
+    if shading == "depth":
+        return render_depth(image, frame, scene, threads, advance)
+    kinds = {"normals": NormalColours, "headlight": Headlight}
+    shader = (
+        AmbientOcclusion(scene, albedo, settings.seed, threads, reach, spp)
+        if shading == "ao"
+        else kinds[shading](scene, albedo, settings.seed, threads)
+    )
+    return shader.render(image, frame, spp, advance)
+
+
+def _look(
+    settings: Settings, albedo: Albedo, frame: NDArray[np.float64], camera: Camera | PinholeCamera
+) -> Look:
+    up = up_of_frame(frame) if isinstance(camera, PinholeCamera) else unit_vector("up", camera.up)
+    light = light_of(settings.sky, settings.sun, frame, up)
+    kind = "gray" if albedo.kind == "none" else albedo.kind
+    threads = arguments.threads(settings.threads)
+    return Look(settings.spp, settings.bounces, kind, albedo.colours, light, settings.seed, threads)
+
+
+def _trace_paths(
+    scene: Scene, frame: Image, image: Image, look: Look, advance: Callable[[float], object]
+) -> int:
+    render_rows = scene._tracer.rows_renderer(frame, image, look)
     rays = 0
-    with progress_bar(height, "row", "rendering", show=progress) as advance:
-        for begin, end in _bands(height, width * settings.spp, scene.device):
-            rays += render_rows(begin, end)
-            advance(end - begin)
-    return image, rays
+    for begin, end in _bands(len(image), image.shape[1] * look.spp, scene.device):
+        rays += render_rows(begin, end)
+        advance(end - begin)
+    return rays
 
 
-def check_png_output(path: PathLike, inputs: Iterable[PathLike | None] = ()) -> str:
-    """Raise unless `write_png` can write to `path`, none of the files `inputs`: call it before rendering."""
-    name = check_output(path, ".png", inputs)
-    try:
-        import PIL.Image  # noqa: F401
-    except ImportError:
-        raise ImportError('writing pictures needs Pillow: pip install "wive[render]"') from None
-    return name
-
-
-def write_png(path: PathLike, image: Image) -> None:
-    """Write linear radiance as an 8-bit sRGB PNG; values above 1 are white. The file is whole or absent."""
-    from PIL import Image as pillow
-
-    levels = np.empty(image.shape, np.uint8)
-    for row, linear in zip(levels, image, strict=True):  # row by row: less memory than the picture takes
-        row[:] = _encoded(np.clip(linear, 0, 1)) * 255 + 0.5
-    # In memory first: Pillow doesn't say why it can't write to a file.
-    content = io.BytesIO()
-    pillow.fromarray(levels).save(content, format="PNG", optimize=True)
-    with atomic_write(path) as file:
-        file.write(content.getbuffer())
-
-
-def _encoded(linear: Image) -> Image:
-    """IEC 61966-2-1, the sRGB transfer function."""
-    return np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
+def _expose(image: Image, exposure: float | str) -> None:
+    """Multiply the picture in place."""
+    if exposure == "auto":
+        middle = image[:, :, 1]  # green is most of the luminance
+        bright = float(np.quantile(middle, 0.9))
+        factor = EXPOSED / bright if bright > 0 else 1.0
+    else:
+        factor = 2.0 ** float(exposure)
+    if factor != 1:
+        with np.errstate(over="ignore"):
+            image *= np.float32(min(factor, float(np.finfo(np.float32).max)))
 
 
 def _bands(height: int, row_paths: int, device: str | None) -> Iterator[tuple[int, int]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING, Any
 
@@ -271,12 +272,27 @@ class Scene(Queries):
         several = "" if geoms is None else f" in {len(geoms)} meshes"
         return f"Scene({len(self)} triangles{several}, {options})"
 
+    def _repr_html_(self) -> str:
+        """What notebooks show: a small picture, if there is Pillow, and the scene's numbers."""
+        from wive._internal.pictures.summary import summary
+
+        try:
+            return summary(self)
+        except Exception:  # notebooks would print a traceback in place of the scene
+            return html.escape(repr(self))
+
     def __reduce__(self) -> tuple[Callable[..., Scene], tuple[Any, ...]]:
         """Pickle the mesh and the options; unpickling builds the tree again."""
         options: dict[str, Any] = {**self._options}
         if self._tracer.geoms is not None:
             options[GEOMS] = geom_offsets(self._tracer.geoms)
         return _rebuild, (self.vertices, self._faces, options, FORMAT_VERSION)
+
+    def _at_rest(self) -> Scene:
+        """The scene as it is now, with the same tree, whatever refits come."""
+        scene = object.__new__(type(self))
+        vars(scene).update(vars(self))
+        return scene
 
     @property
     def _bvh(self) -> _cpu.Bvh:

@@ -43,6 +43,14 @@ Quality parse_quality(const std::string& name) {
     return Quality::medium;
 }
 
+Albedo parse_albedo(const std::string& name) {
+    if (name == "gray") return Albedo::gray;
+    if (name == "normals") return Albedo::normals;
+    if (name == "faces") return Albedo::of_faces;
+    expect(name == "vertices", "albedo: expected 'gray', 'normals', 'faces' or 'vertices'");
+    return Albedo::of_vertices;
+}
+
 template <class Real>
 std::unique_ptr<PyBvh> build(Array<Real> vertices, Array<std::int32_t> faces, const std::string& accuracy,
                              unsigned threads, int depth_limit, const std::string& nodes, const std::string& quality) {
@@ -61,17 +69,28 @@ ForeignTracer foreign_tracer(const std::optional<std::pair<std::uintptr_t, std::
 std::uint64_t render(const PyBvh& self, const KernelArg& kernel, const Array<float>& camera, Array<float> image,
                      int row_begin, int row_end, int samples, int bounces, const std::string& albedo,
                      std::uint32_t seed, unsigned threads, unsigned in_flight,
-                     std::optional<std::pair<std::uintptr_t, std::uintptr_t>> tracer, bool check) {
+                     std::optional<std::pair<std::uintptr_t, std::uintptr_t>> tracer, bool check,
+                     const std::optional<Array<float>>& colours, const std::optional<Array<float>>& light) {
     expect(self.bvh().precision() == Precision::float32, "render: expected a float32 scene, got float64");
     expect(camera.ndim() == 2 && camera.shape(0) == 4 && camera.shape(1) == 3, "camera: expected shape (4, 3)");
     expect(image.ndim() == 3 && image.shape(2) == 3, "image: expected shape (height, width, 3)");
     expect(0 <= row_begin && row_begin <= row_end && row_end <= image.shape(0),
            "rows: expected a range within the image");
     expect(samples > 0 && bounces >= 0, "samples, bounces: expected at least 1 and 0");
-    expect(albedo == "gray" || albedo == "normals", "albedo: expected 'gray' or 'normals'");
+    const Mesh<float> mesh = self.mesh<float>();
+    const Albedo surface = parse_albedo(albedo);
+    const bool has_colours = surface == Albedo::of_faces || surface == Albedo::of_vertices;
+    const std::size_t colour_count = surface == Albedo::of_faces ? mesh.face_count : mesh.vertex_count;
+    expect(has_colours == colours.has_value(), "colours: expected with albedo 'faces' and 'vertices' alone");
+    expect(!has_colours || (colours->ndim() == 2 && colours->shape(1) == 3 &&
+                            static_cast<std::size_t>(colours->shape(0)) == colour_count),
+           "colours: expected shape (f, 3) or (v, 3)");
+    expect(!light || (light->ndim() == 2 && light->shape(0) == 5 && light->shape(1) == 3),
+           "light: expected shape (5, 3)");
     const auto row = [&](py::ssize_t i) { return load_vec3(camera.data(i, 0)); };
+    const auto of_light = [&](py::ssize_t i) { return load_vec3(light->data(i, 0)); };
     const RenderJob job = {self.bvh().view(),
-                           self.mesh<float>(),
+                           mesh,
                            table_of<float>(kernel),
                            self.bvh().accuracy(),
                            self.bvh().node_form(),
@@ -80,11 +99,13 @@ std::uint64_t render(const PyBvh& self, const KernelArg& kernel, const Array<flo
                            static_cast<int>(image.shape(0)),
                            samples,
                            bounces,
-                           albedo == "normals" ? Albedo::normals : Albedo::gray,
+                           surface,
                            seed,
                            image.mutable_data(),
                            in_flight,
-                           foreign_tracer(tracer)};
+                           foreign_tracer(tracer),
+                           light ? Light{of_light(0), of_light(1), of_light(2), of_light(3), of_light(4)} : white_sky,
+                           has_colours ? colours->data() : nullptr};
     const Released released;
     if (check) {  // the arrays are the caller's, who may have changed them since the tree was built
         Threads checkers(thread_count(threads));
@@ -253,7 +274,8 @@ PYBIND11_MODULE(_cpu, m, pybind11::mod_gil_not_used()) {
                                })
         .def("render_rows", &render, py::arg("kernel"), array_arg("camera"), array_arg("image"), py::arg("row_begin"),
              py::arg("row_end"), py::arg("samples"), py::arg("bounces"), py::arg("albedo"), py::arg("seed") = 0,
-             py::arg("threads") = 0, py::arg("in_flight") = 0, py::arg("tracer") = py::none(), py::arg("check") = true);
+             py::arg("threads") = 0, py::arg("in_flight") = 0, py::arg("tracer") = py::none(), py::arg("check") = true,
+             py::arg("colours").noconvert() = py::none(), py::arg("light").noconvert() = py::none());
     bind_queries(bvh);
     bind_surface(m);
     bind_spawn(m);

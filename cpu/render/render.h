@@ -1,4 +1,4 @@
-// A path tracer with a white sky and diffuse surfaces: the paper's benchmark, and pictures of meshes.
+// A path tracer of diffuse surfaces under a sky and a sun: the paper's benchmark, and pictures of meshes.
 #pragma once
 
 #include <cstddef>
@@ -7,6 +7,7 @@
 #include "build/mesh.h"
 #include "core/vec3.h"
 #include "kernels/kernels.h"
+#include "render/light.h"
 
 namespace wive {
 
@@ -14,7 +15,7 @@ struct Camera {
     Vec3 eye, centre, right, up;  // eye to picture centre; centre to its right and to its top edge
 };
 
-enum class Albedo { gray, normals };
+enum class Albedo { gray, normals, of_faces, of_vertices };
 
 // The closest hits of a batch by another traversal, for comparisons in which nothing else differs. Rays are (count, 3),
 // with one interval for all; prim is -1 on a miss, uv (count, 2) in Embree's convention. Every rendering thread calls
@@ -40,6 +41,8 @@ struct RenderJob {
     float* image;            // (height, width, 3), linear radiance, row 0 at the top
     unsigned in_flight = 0;  // rays interleaved per thread; 0: chosen by the batch's size
     ForeignTracer tracer = {};
+    Light light = white_sky;
+    const float* colours = nullptr;  // (face_count, 3) or (vertex_count, 3), if the albedo is theirs
 };
 
 // Renders rows [row_begin, row_end). Returns the number of rays traced.

@@ -14,7 +14,7 @@ from wive import _cpu
 from wive._internal.arguments import Lanes, Work
 from wive._internal.arrays import NUMPY
 from wive._internal.distant import Ball, Moved, moved
-from wive._internal.picture import Image, Settings
+from wive._internal.picture import Image, Look
 from wive._internal.precision import Floats, real_of
 from wive._internal.rays import Rays
 from wive._internal.wrapping import Wrapping
@@ -172,12 +172,12 @@ class WarpTracer:
         """A tracer of moved vertices, as many as before."""
         return WarpTracer(self.bvh.refitted(vertices), self.faces, self.device, self.geoms)
 
-    def rows_renderer(self, camera: Image, image: Image, settings: Settings) -> Callable[[int, int], int]:
+    def rows_renderer(self, camera: Image, image: Image, look: Look) -> Callable[[int, int], int]:
         """A function that renders rows [begin, end) into `image` and returns how many rays it traced."""
         from wive.warp_kernels.scene.render import PictureRenderer
 
         with memory_errors():
-            renderer = PictureRenderer(self, camera, image, settings)
+            renderer = PictureRenderer(self, camera, image, look)
 
         def render_rows(begin: int, end: int) -> int:
             with memory_errors():

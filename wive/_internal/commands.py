@@ -18,38 +18,49 @@ from wive._internal.files import atomic_write, check_output
 from wive._internal.npz_writer import write_npz
 from wive._internal.npzfile import Npz, check_input, open_npy_or_npz
 from wive._internal.picture import Settings
+from wive._internal.pictures.image_files import check_picture_output, write_picture
 from wive._internal.precision import FLOAT64, Floats, Real, real_named
 from wive._internal.progress import progress_bar
-from wive._internal.terrain import terrain_camera, terrain_mesh
+from wive._internal.terrain import terrain_camera, terrain_colours, terrain_mesh
 from wive._internal.textures import refuse_part
 from wive.all_hits import AllHits
 from wive.backend import Backend, backends
 from wive.camera import Camera
 from wive.hits import Hits
+from wive.colors import load_colors
 from wive.meshfile import load_mesh
-from wive.rendering import check_png_output, render_counted, write_png
+from wive.rendering import render_counted
 from wive.scene import Scene
 
 # Sine of an angle: a nearer `up` is along the view.
 ALONG_VIEW = 1e-6
+# Shadings that show no colours of surfaces.
+COLOURLESS = "normals", "depth"
 # Rays per step of the progress bar.
 BATCH_RAYS = 500_000
 
 
 def render_picture(options: Namespace) -> None:
-    """`wive render`: path-trace a mesh, or the terrain, into a PNG."""
-    output = check_png_output(options.output, [options.mesh])
+    """`wive render`: a picture of a mesh, or of the terrain."""
+    output = check_picture_output(options.output, [options.mesh], options.shading)
     if options.mesh:
         refuse_part(check_input(options.mesh), output)
-    options.albedo = options.albedo or ("gray" if options.mesh else "normals")
-    settings = Settings(**{field.name: getattr(options, field.name) for field in fields(Settings)})
+    chosen = {field.name: getattr(options, field.name) for field in fields(Settings)}
+    colours = chosen.pop("albedo")
+    settings = Settings(**chosen)
     scene = _scene(options, *(load_mesh(options.mesh) if options.mesh else terrain_mesh()))
+    if colours != "file":
+        settings = replace(settings, albedo=colours)
+    elif options.shading not in COLOURLESS:
+        albedo = load_colors(options.mesh) if options.mesh else terrain_colours(scene.vertices)
+        settings = replace(settings, albedo=albedo)
     camera = _camera(options, scene)
     begin = time.perf_counter()
-    image, rays = render_counted(scene, camera, settings, progress=True)
+    picture = render_counted(scene, camera, settings, progress=True)
     seconds = time.perf_counter() - begin
-    write_png(output, image)
-    print(f"{output}: {_rate(rays, seconds)}, {_tracer(scene)}, {len(scene):,} triangles")
+    write_picture(output, picture.image, srgb=picture.shading != "normals")
+    how = f"{_rate(picture.rays, seconds)}, {_tracer(scene)}, {len(scene):,} triangles"
+    print(f"{output}: {picture.shading}, {how}")
 
 
 def trace_rays(options: Namespace) -> None:
@@ -161,7 +172,11 @@ def _camera(options: Namespace, scene: Scene) -> Camera:
     if options.mesh is None:
         camera = terrain_camera()
     else:
-        camera = Camera.framing(scene.bounds, options.up, aspect=options.width / options.height, **fov)
+        aspect = options.width / options.height
+        if options.eye is None and options.target is None:
+            camera = Camera.showing(scene, options.up, options.fov, aspect)
+        else:
+            camera = Camera.framing(scene.bounds, options.up, aspect=aspect, **fov)
     given = {name: getattr(options, name) for name in ("eye", "target", "up", "fov")}
     given = {name: value for name, value in given.items() if value is not None}
     if "up" not in given:  # a view along the automatic up, as from above, has the next axis up

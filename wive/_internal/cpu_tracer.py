@@ -14,7 +14,7 @@ from wive._internal import arguments
 from wive._internal.arguments import Work
 from wive._internal.arrays import NUMPY
 from wive._internal.distant import Ball, Moved, Traced, moved
-from wive._internal.picture import Image, Settings
+from wive._internal.picture import Image, Look
 from wive._internal.precision import Floats, real_of
 from wive._internal.rays import Rays, rays_of_numpy
 from wive._internal.wrapping import Wrapping
@@ -115,20 +115,28 @@ class CpuTracer:
         """A tracer of moved vertices, as many as before."""
         return CpuTracer(self.bvh.refitted(vertices), self._faces, self.backend, self.geoms)
 
-    def rows_renderer(self, camera: Image, image: Image, settings: Settings) -> Callable[[int, int], int]:
+    def rows_renderer(self, camera: Image, image: Image, look: Look) -> Callable[[int, int], int]:
         """A function that renders rows [begin, end) into `image` and returns how many rays it traced.
 
         Its first call checks the mesh, whose arrays the caller may have changed since the tree was built.
         """
-        what = settings.spp, settings.bounces, settings.albedo, settings.seed
-        threads = arguments.threads(settings.threads)
+        what = look.spp, look.bounces, look.albedo, look.seed
         unchecked = True
 
         def render_rows(begin: int, end: int) -> int:
             nonlocal unchecked
             check, unchecked = unchecked, False
             return self.bvh.render_rows(
-                self._kernels, camera, image, begin, end, *what, threads=threads, check=check
+                self._kernels,
+                camera,
+                image,
+                begin,
+                end,
+                *what,
+                threads=look.threads,
+                check=check,
+                colours=look.colours,
+                light=look.light,
             )
 
         return render_rows

@@ -26,15 +26,16 @@ def file_name(path: PathLike) -> str:
     return name
 
 
-def check_output(path: PathLike, suffix: str = "", inputs: Iterable[PathLike | None] = ()) -> str:
-    """Raise ValueError or OSError if `path` can't become a file that ends in `suffix`; return it as text.
+def check_output(path: PathLike, suffix: str | tuple[str, ...] = "", inputs: Iterable[PathLike | None] = ()) -> str:
+    """Raise ValueError or OSError if `path` can't become a file that ends in `suffix`, or in one of several; return it as text.
 
     It can't if it is one of the files `inputs`, by whatever name. Call this before long work whose result is
     written there.
     """
     name = file_name(path)
     if not name.lower().endswith(suffix):
-        raise ValueError(f"output file must end in {suffix}, got {name!r}")
+        endings = suffix if isinstance(suffix, str) else f"{', '.join(suffix[:-1])} or {suffix[-1]}"
+        raise ValueError(f"output file must end in {endings}, got {name!r}")
     final = os.path.realpath(name)
     folder = os.path.dirname(final)
     if not os.path.isdir(folder):

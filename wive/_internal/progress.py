@@ -1,5 +1,6 @@
-"""A progress bar on stderr, by tqdm if it is installed."""
+"""A progress bar by tqdm if it is installed: on stderr, or in a notebook as a widget."""
 
+import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
@@ -7,14 +8,16 @@ from contextlib import contextmanager
 @contextmanager
 def progress_bar(
     total: int, unit: str, title: str, *, show: bool = True
-) -> Iterator[Callable[[int], object]]:
+) -> Iterator[Callable[[float], object]]:
     """Show a bar while the block runs; the function it yields advances it by a number of units.
 
     Without tqdm (extra `render`) the work goes on with no bar.
     """
     if show:
         try:
-            from tqdm import tqdm
+            with warnings.catch_warnings():  # a notebook without widgets has a bar of text
+                warnings.simplefilter("ignore")
+                from tqdm.auto import tqdm
         except ImportError:
             show = False
     if not show:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from wive import _cpu
 from wive._internal.arguments import Work
-from wive._internal.picture import Image, Settings
+from wive._internal.picture import Image, Look
 from wive._internal.precision import Floats
 from wive._internal.rays import Rays
 
@@ -67,5 +67,5 @@ class Tracer(Protocol):
     def refitted(self, vertices: Floats) -> Tracer:
         """A tracer of moved vertices, as many as before."""
 
-    def rows_renderer(self, camera: Image, image: Image, settings: Settings) -> Callable[[int, int], int]:
+    def rows_renderer(self, camera: Image, image: Image, look: Look) -> Callable[[int, int], int]:
         """A function that renders rows [begin, end) into `image` and returns how many rays it traced."""

@@ -40,16 +40,21 @@ CORNER_BYTES[list(b"0123456789+-/")] = True
 
 def read(data: bytes, name: str, dtype: np.dtype[Any]) -> Mesh:
     """Vertices of this dtype and triangles."""
-    data = plain(data, name)
-    if b"#" in data:
-        data = COMMENT.sub(b"", data)
-    text = Text(_joined(data) if b"\\" in data else data, name)
+    text = text_of(data, name)
     is_vertex = text.same(text.heads, b"v")
     is_face = text.same(text.heads, b"f") | text.same(text.heads, b"fo")
     _check_others(text, text.heads[~(is_vertex | is_face)])
     vertices = _vertices(text, is_vertex, dtype)
     corners, sizes = _corners(text, text.heads[is_vertex], is_face)
     return vertices, triangulate(vertices, sizes, corners, name)
+
+
+def text_of(data: bytes, name: str) -> Text:
+    """The statements, without comments, each on one line."""
+    data = plain(data, name)
+    if b"#" in data:
+        data = COMMENT.sub(b"", data)
+    return Text(_joined(data) if b"\\" in data else data, name)
 
 
 def _joined(data: bytes) -> bytes:

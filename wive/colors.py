@@ -1,0 +1,42 @@
+"""Colours of mesh files, for pictures."""
+
+from __future__ import annotations
+
+from importlib import import_module
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wive._internal.formats.kinds import kind_of
+from wive._internal.room import room_for
+from wive.meshfile import MeshSource, content_of
+
+READERS = {"ply": "ply", "off": "off", "obj": "obj", "gltf": "gltf", "glb": "gltf", "vrm": "gltf"}
+# What the whitest surfaces of a file reflect, as white paint does; and those that it gives no colour.
+WHITE, UNKNOWN = 0.8, 0.6
+
+
+def load_colors(source: MeshSource, *, file_type: str | None = None) -> NDArray[np.float32] | None:
+    """The colours in a mesh file, as `wive.render` takes them for `albedo`; None if there are none.
+
+    PLY: of vertices or faces. OFF: likewise. OBJ: of vertices, or the diffuse colours of materials. glTF: base
+    colour factors and vertex colours. Textures, and files of other formats, have none.
+
+    Arguments:
+        source, file_type: as `load_mesh` takes them.
+
+    Returns (v,3) float32 of vertices, or (f,1,3) of triangles, in the order of `load_mesh`: linear reflectances
+    from 0 to 0.8, which is white; 0.6 for what the file gives no colour. Raises what `load_mesh` raises.
+
+    >>> picture = wive.render(wive.Scene.from_file(path), albedo=wive.load_colors(path))
+    """
+    name, folder, data = content_of(source)
+    kind = kind_of(data, name, file_type)
+    if kind not in READERS:
+        return None
+    with room_for(name):
+        colours = import_module(f"wive._internal.formats.colours.{READERS[kind]}").read(data, name, folder)
+    if colours is None:
+        return None
+    reflected = np.where(np.isnan(colours), UNKNOWN, WHITE * np.nan_to_num(colours))
+    return np.clip(reflected, 0, WHITE).astype(np.float32)
