@@ -242,12 +242,13 @@ class Bvh:
         """Path-trace rows [row_begin, row_end) of image (height,width,3) in place; returns the rays traced.
 
         camera (4,3): eye, then the vectors from the eye to the picture's centre, from its centre to the right
-        edge's middle, and from its centre to the top edge's middle. colours: (f,3) or (v,3), with albedo
-        "faces" or "vertices". light (5,3): up, radiance of the sky at the horizon and straight up, direction to
-        the sun, radiance of a white surface that faces the sun; None is a white sky of radiance 1. Random numbers come from (pixel, sample, bounce) alone, so a picture does not depend on
-        threads or kernel. tracer: addresses of a C function that traces in the kernel's place and of its
-        context (ForeignTracer in cpu/render/render.h), for comparisons. check: check the mesh first, whose
-        arrays the caller may have changed since the tree was built; once per picture is enough.
+        edge's middle, and from its centre to the top edge's middle. Linear radiance. Random numbers come from
+        (pixel, sample, bounce) alone, so a picture does not depend on threads or kernel. tracer: addresses of
+        a C function that traces in the kernel's place and of its context (ForeignTracer in
+        cpu/render/render.h), for comparisons. check: check the mesh first, whose arrays the caller may have
+        changed since the tree was built; once per picture is enough. colours: (f,3) or (v,3), with albedo
+        "faces" or "vertices". light (5,3): up, radiance of the sky at the horizon and straight up, direction
+        to the sun, radiance of a white surface that faces the sun; None is a white sky of radiance 1.
         """
 
 def surface_points(

@@ -85,7 +85,7 @@ class Camera:
 
         Arguments:
             up: (3,); None is as for `framing`; in rooms y, or z if most level surfaces face it.
-            fov: vertical, in degrees; None is 40 outside and 60 in rooms.
+            fov: vertical, in degrees; None is 40 outside and 65 in rooms.
             aspect: the picture's width divided by its height.
 
         Raises ValueError or TypeError that names the argument of no sense, or if nothing can be hit.
@@ -131,9 +131,7 @@ class Camera:
         return view_axes(self.eye, self.target, self.up)
 
 
-def framing_points(
-    points: NDArray[np.float64], up: ArrayLike | None, fov: float, aspect: float
-) -> Camera:
+def framing_points(points: NDArray[np.float64], up: ArrayLike | None, fov: float, aspect: float) -> Camera:
     """`Camera.framing` for points (n,3)."""
     low, high = points.min(axis=0), points.max(axis=0)
     fov, aspect = _field_of_view(fov), arguments.real("aspect", aspect)

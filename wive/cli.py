@@ -83,8 +83,8 @@ def _add_render(subparsers: "argparse._SubParsersAction[_Parser]") -> None:
     parser = subparsers.add_parser(
         "render",
         help="make a picture of a mesh",
-        description="Make a picture of a mesh: path-traced by daylight, or by ambient occlusion if the camera "
-        "stands inside.",
+        description="Make a picture of a mesh: path-traced by daylight, or by ambient occlusion if the "
+        "camera stands inside.",
         formatter_class=_Defaults,
     )
     parser.add_argument("mesh", nargs="?", metavar="MESH", help="mesh file; default: real terrain")
@@ -136,7 +136,9 @@ def _add_render(subparsers: "argparse._SubParsersAction[_Parser]") -> None:
             metavar=("X", "Y", "Z"),
             help=f"{meaning}; default: shows most of the mesh",
         )
-    parser.add_argument("--fov", type=float, help="vertical field of view in degrees; default: 40, in rooms 60")
+    parser.add_argument(
+        "--fov", type=float, help="vertical field of view in degrees; default: 40, in rooms 65"
+    )
     parser.add_argument("--seed", type=int, default=Settings.seed, help="of the random numbers")
     _add_scene_options(parser)
     parser.set_defaults(run=commands.render_picture)

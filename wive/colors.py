@@ -19,14 +19,15 @@ WHITE, UNKNOWN = 0.8, 0.6
 def load_colors(source: MeshSource, *, file_type: str | None = None) -> NDArray[np.float32] | None:
     """The colours in a mesh file, as `wive.render` takes them for `albedo`; None if there are none.
 
-    PLY: of vertices or faces. OFF: likewise. OBJ: of vertices, or the diffuse colours of materials. glTF: base
-    colour factors and vertex colours. Textures, and files of other formats, have none.
+    PLY: of vertices or faces. OFF: likewise. OBJ: of vertices, or the diffuse colours of materials. glTF:
+    base colour factors and vertex colours. Textures, and files of other formats, have none.
 
     Arguments:
         source, file_type: as `load_mesh` takes them.
 
-    Returns (v,3) float32 of vertices, or (f,1,3) of triangles, in the order of `load_mesh`: linear reflectances
-    from 0 to 0.8, which is white; 0.6 for what the file gives no colour. Raises what `load_mesh` raises.
+    Returns (v,3) float32 of vertices, or (f,1,3) of triangles, in the order of `load_mesh`: linear
+    reflectances from 0 to 0.8, which is white; 0.6 for what the file gives no colour. Raises what
+    `load_mesh` raises.
 
     >>> picture = wive.render(wive.Scene.from_file(path), albedo=wive.load_colors(path))
     """

@@ -13,10 +13,10 @@ from wive._internal import arguments
 from wive._internal.picture import Image, Look, Settings, ShadingOption, SkyOption
 from wive._internal.pictures.albedo import Albedo, albedo_of
 from wive._internal.pictures.daylight import light_of, up_of_frame
-from wive._internal.pictures.shades import AmbientOcclusion, Headlight, NormalColours, render_depth
-from wive._internal.pictures.viewpoint import default_camera, reaches_sky, stands_inside
 from wive._internal.pictures.image_files import write_picture as write_picture
 from wive._internal.pictures.image_files import write_png as write_png
+from wive._internal.pictures.shades import AmbientOcclusion, Headlight, NormalColours, render_depth
+from wive._internal.pictures.viewpoint import default_camera, reaches_sky, stands_inside
 from wive._internal.progress import progress_bar
 from wive.camera import Camera, unit_vector
 from wive.scene import Scene
@@ -62,10 +62,10 @@ def render(
         width, height: in pixels.
         spp: samples per pixel: paths, or rays of ambient occlusion.
         bounces: diffuse bounces after which a path ends.
-        albedo: what surfaces reflect: linear colours from 0 to 1, (v,3) per vertex, (f,3) per triangle or (3,)
-            for all, such as `load_colors` returns; or uint8, sRGB, as trimesh has them. If there are as many
-            vertices as triangles, (f,1,3) is per triangle. "gray" is 0.6, "normals" coloured by normal. None is
-            gray in "path", white in "ao" and "headlight". Of no use for "normals" and "depth".
+        albedo: what surfaces reflect: linear colours from 0 to 1, (v,3) per vertex, (f,3) per triangle or
+            (3,) for all, such as `load_colors` returns; or uint8, sRGB, as trimesh has them. If there are as
+            many vertices as triangles, (f,1,3) is per triangle. "gray" is 0.6, "normals" is coloured by
+            normal. None is gray in "path", white in "ao" and "headlight". Of no use for other shadings.
         sky: "day", blue with a sun; "cloudy"; "white", of radiance 1 everywhere; "black". For "path".
         sun: (3,) direction towards the sun, under any sky; None is on the left of the camera by day.
         exposure: stops, powers of two by which the picture is brighter; "auto" makes most of it visible. For

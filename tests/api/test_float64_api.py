@@ -216,9 +216,9 @@ def test_exact_takes_float64_that_float32_can_hold_and_names_what_it_cannot(tmp_
 def test_rendering_refuses_float64_in_one_line():
     vertices, faces = survey(1)
     with pytest.raises(ValueError) as error:
-        wive.render(wive.Scene(vertices, faces), width=8, height=8, spp=1)
+        wive.render(wive.Scene(vertices, faces), shading="path", width=8, height=8, spp=1)
     assert message(error) == (
-        "scene must be of float32 vertices to be rendered, got float64: "
+        "scene must be of float32 vertices to be path-traced, got float64: use another shading, or "
         "make one with (vertices - vertices.mean(axis=0)).astype(np.float32)"
     )
 

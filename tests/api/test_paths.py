@@ -11,7 +11,7 @@ from support.meshes import TRIANGLE
 import wive
 from wive._internal.files import check_output
 from wive._internal.npzfile import check_input
-from wive.rendering import check_png_output, write_png
+from wive._internal.pictures.image_files import check_picture_output
 
 
 class Named:
@@ -65,8 +65,8 @@ def test_meshes_are_loaded(tmp_path, form):
 def test_pictures_are_written(tmp_path, form):
     pytest.importorskip("PIL")
     path = tmp_path / "x.png"
-    assert check_png_output(form(path)) == str(path)
-    write_png(form(path), np.zeros((2, 2, 3), np.float32))
+    assert check_picture_output(form(path)) == str(path)
+    wive.write_picture(form(path), np.zeros((2, 2, 3), np.float32))
     assert path.stat().st_size > 0
 
 

@@ -7,6 +7,9 @@ from support.meshes import sphere
 import wive
 from wive.rendering import write_png
 
+# Paths under a sky of radiance 1, without a sun.
+WHITE = {"shading": "path", "sky": "white"}
+
 FLOOR = (
     np.array([[-1000, 0, -1000], [1000, 0, -1000], [1000, 0, 1000], [-1000, 0, 1000]], np.float32),
     np.array([[0, 2, 1], [0, 3, 2]], np.int32),
@@ -134,9 +137,10 @@ def test_a_picture_checks_the_mesh_once(monkeypatch):
 def test_a_picture_of_a_mesh_that_was_changed_after_the_build_is_refused():
     vertices, faces = sphere(2)
     scene = wive.Scene(vertices, faces)
+    camera = wive.Camera.framing(scene.bounds)
     faces[7, 1] = len(vertices)
     with pytest.raises(ValueError, match=r"^faces must index the .* in face 7$"):
-        wive.render(scene, **SMALL)
+        wive.render(scene, camera, shading="path", **SMALL)
 
 
 def test_another_seed_is_another_picture_of_the_same_scene(backend):
@@ -148,25 +152,25 @@ def test_another_seed_is_another_picture_of_the_same_scene(backend):
 
 def test_the_sky_is_white(backend):
     camera = wive.Camera(eye=(0, 0, 10), target=(0, 0, 20))
-    assert (wive.render(wive.Scene(*sphere(1), backend=backend), camera, **SMALL) == 1).all()
+    assert (wive.render(wive.Scene(*sphere(1), backend=backend), camera, **WHITE, **SMALL) == 1).all()
 
 
 def test_no_light_gets_into_a_closed_surface(backend):
     camera = wive.Camera(eye=(0, 0, 0), target=(0.3, 0.2, 1), fov=100)
-    picture = wive.render(wive.Scene(*sphere(4), backend=backend), camera, bounces=3, **SMALL)
+    picture = wive.render(wive.Scene(*sphere(4), backend=backend), camera, bounces=3, **WHITE, **SMALL)
     assert (picture == 0).all()
 
 
 def test_an_open_floor_reflects_its_albedo(backend):
     camera = wive.Camera(eye=(0, 10, 0), target=(0, 0, 0), up=(0, 0, -1))
-    picture = wive.render(wive.Scene(*FLOOR, backend=backend), camera, **SMALL)
+    picture = wive.render(wive.Scene(*FLOOR, backend=backend), camera, **WHITE, **SMALL)
     assert 0 < picture[0, 0, 0] < 1
     np.testing.assert_allclose(picture, picture[0, 0, 0], rtol=1e-5)
 
 
 def test_normal_colours_depend_on_the_normal(backend):
     scene = wive.Scene(*sphere(4), backend=backend)
-    gray, normals = (wive.render(scene, albedo=albedo, **SMALL) for albedo in ("gray", "normals"))
+    gray, normals = (wive.render(scene, albedo=albedo, **WHITE, **SMALL) for albedo in ("gray", "normals"))
     assert np.ptp(gray, axis=2).max() == 0
     assert np.ptp(normals, axis=2).max() > 0.2
 
@@ -175,14 +179,15 @@ def test_right_is_right_and_top_is_the_first_row(backend):
     vertices, faces = sphere(3)
     scene = wive.Scene(vertices + np.float32([2, 1, 0]), faces, backend=backend)
     camera = wive.Camera(eye=(0, 0, 10), target=(0, 0, 0), fov=40)
-    dark = wive.render(scene, camera, **SMALL).mean(axis=2) < 1
+    dark = wive.render(scene, camera, **WHITE, **SMALL).mean(axis=2) < 1
     rows, columns = np.nonzero(dark)
     assert rows.mean() < 13
     assert columns.mean() > 26
 
 
 def test_a_framed_mesh_fills_the_picture_but_not_the_corners(backend):
-    dark = wive.render(wive.Scene(*sphere(3), backend=backend), width=64, height=64, spp=1).mean(axis=2) < 1
+    scene = wive.Scene(*sphere(3), backend=backend)
+    dark = wive.render(scene, **WHITE, width=64, height=64, spp=1).mean(axis=2) < 1
     assert 0.15 < dark.mean() < 0.8
     assert not dark[[0, 0, -1, -1], [0, -1, 0, -1]].any()
 

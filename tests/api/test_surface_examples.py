@@ -43,6 +43,20 @@ def test_a_shell_is_open_outside_and_closed_inside(shell: tuple[np.ndarray, np.n
     assert (openness(wive.Scene(*shell), rays=4, reach=0.01) > 0.5).mean() > 0.9
 
 
+def test_an_occlusion_picture_is_that_of_the_renderer(tmp_path: Path) -> None:
+    vertices, faces = sphere(4)
+    ground = np.float32([[-9, -1, -9], [9, -1, -9], [9, -1, 9], [-9, -1, 9]])
+    mesh = (
+        np.concatenate([vertices, ground]),
+        np.concatenate([faces, [[2562, 2564, 2563], [2562, 2565, 2564]]]),
+    )
+    scene, camera = wive.Scene(*mesh), wive.Camera(eye=(2, 3, 6), target=(0, 0, 0))
+    found = example("occlusion_picture").occlusion(scene, camera, 96, 54, rays=64)
+    expected = wive.render(scene, camera, shading="ao", width=96, height=54, spp=64)[..., 0]
+    assert abs(found - expected).mean() < 0.04 and found.min() < 0.6
+    assert found[:4].mean() == pytest.approx(expected[:4].mean(), abs=0.02)
+
+
 def test_the_programs_run(
     shell: tuple[np.ndarray, np.ndarray],
     tmp_path: Path,
@@ -50,7 +64,7 @@ def test_the_programs_run(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     np.savez(tmp_path / "shell.npz", vertices=shell[0], faces=shell[1])
-    for name in ("thickness", "openness"):
+    for name in ("thickness", "openness", "occlusion_picture"):
         monkeypatch.setattr(sys, "argv", [name, str(tmp_path / "shell.npz")])
         example(name).main()
     assert "least 0.099" in (text := capsys.readouterr().out) and "100.0% of the surface" in text

@@ -69,7 +69,7 @@ def test_render_without_a_mesh_draws_terrain_into_the_current_folder(tmp_path, m
 
 def test_render_takes_a_camera(ball, tmp_path):
     pillow = pytest.importorskip("PIL.Image")
-    small = ("--width", 32, "--height", 32, "--spp", 1)
+    small = ("--width", 32, "--height", 32, "--spp", 1, "--sky", "white")
     away = ("--eye", 0, 0, -5, "--target", 0, 0, -9, "--up", 0, 1, 0, "--fov", 50)
     assert run("render", ball, "-o", tmp_path / "away.png", *small, *away) == 0
     with pillow.open(tmp_path / "away.png") as image:
@@ -145,7 +145,10 @@ def test_backends_lists_each_with_its_reason(capsys):
     ("arguments", "expected"),
     [
         (("render", "{tmp}/no.stl"), "{tmp}/no.stl: no such file"),
-        (("render", "{ball}", "-o", "{tmp}/x.jpg"), "output file must end in .png, got '{tmp}/x.jpg'"),
+        (
+            ("render", "{ball}", "-o", "{tmp}/x.jpg"),
+            "output file must end in .png, .exr, .hdr, .npy, .tif or .tiff, got '{tmp}/x.jpg'",
+        ),
         (
             ("render", "{ball}", "-o", "{tmp}/no/x.png"),
             "output folder '{tmp}/no' does not exist: create it first",

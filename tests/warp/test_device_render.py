@@ -30,7 +30,8 @@ def both(device):
 )
 def test_a_picture_is_that_of_the_cpu_to_the_bit(both, albedo, width, height, spp):
     expected, found = (
-        wive.render(scene, width=width, height=height, spp=spp, albedo=albedo) for scene in both
+        wive.render(scene, shading="path", width=width, height=height, spp=spp, albedo=albedo)
+        for scene in both
     )
     np.testing.assert_array_equal(found, expected)
     if width * height > 1:
@@ -39,7 +40,7 @@ def test_a_picture_is_that_of_the_cpu_to_the_bit(both, albedo, width, height, sp
 
 @pytest.mark.parametrize("bounces", [0, 1, 30])
 def test_bounces_and_seed_are_those_of_the_cpu(both, bounces):
-    settings = {"width": 40, "height": 20, "spp": 3, "bounces": bounces, "seed": 77}
+    settings = {"shading": "path", "width": 40, "height": 20, "spp": 3, "bounces": bounces, "seed": 77}
     expected, found = (wive.render(scene, **settings) for scene in both)
     np.testing.assert_array_equal(found, expected)
 
@@ -47,7 +48,7 @@ def test_bounces_and_seed_are_those_of_the_cpu(both, bounces):
 def test_bands_and_passes_change_no_bit(both, monkeypatch):
     from wive.warp_kernels.scene import render as warp_render
 
-    settings = {"width": 100, "height": 12, "spp": 200}
+    settings = {"shading": "path", "width": 100, "height": 12, "spp": 200}
     expected = wive.render(both[1], **settings)
     monkeypatch.setattr(warp_render, "MOST_PATHS", warp_render.WAVE_SIZE)
     monkeypatch.setattr(wive.rendering, "BAND_PATHS", 5 * 100 * 200)
@@ -59,9 +60,28 @@ def test_as_many_rays_are_traced_as_on_the_cpu(both):
     from wive._internal.picture import Settings
     from wive.rendering import render_counted
 
-    settings = Settings(width=50, height=30, spp=3)
-    rays = [render_counted(scene, None, settings, progress=False)[1] for scene in both]
+    settings = Settings(shading="path", width=50, height=30, spp=3)
+    rays = [render_counted(scene, None, settings, progress=False).rays for scene in both]
     assert rays[0] == rays[1] > 50 * 30 * 3
+
+
+@pytest.mark.parametrize("sky", ["day", "cloudy", "black"])
+@pytest.mark.parametrize("rows", ["vertices", "faces"])
+def test_light_and_colours_are_those_of_the_cpu(both, sky, rows):
+    random = np.random.default_rng(3)
+    albedo = random.random((len(getattr(both[0], rows)), 3))
+    what = {"shading": "path", "width": 40, "height": 30, "spp": 5, "sky": sky, "sun": (0.3, 1, 0.4)}
+    expected, found = (wive.render(scene, albedo=albedo, **what) for scene in both)
+    np.testing.assert_array_equal(found, expected)
+    assert np.ptp(expected, axis=2).max() > 0.05
+
+
+@pytest.mark.parametrize("shading", ["ao", "headlight", "normals", "depth"])
+def test_other_shadings_are_those_of_the_cpu(both, shading):
+    what = {"shading": shading, "width": 40, "height": 30, "spp": 5, "reach": 2.5}
+    expected, found = (wive.render(scene, **what) for scene in both)
+    np.testing.assert_array_equal(found, expected)
+    assert np.unique(expected).size > 50
 
 
 def test_the_command_line_renders_on_a_device(both, tmp_path, capsys, device):

@@ -26,8 +26,8 @@ from wive._internal.textures import refuse_part
 from wive.all_hits import AllHits
 from wive.backend import Backend, backends
 from wive.camera import Camera
-from wive.hits import Hits
 from wive.colors import load_colors
+from wive.hits import Hits
 from wive.meshfile import load_mesh
 from wive.rendering import render_counted
 from wive.scene import Scene

@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wive import _cpu
-from wive._internal import arguments
 from wive._internal.arguments import Work
 from wive._internal.arrays import NUMPY
 from wive._internal.distant import Ball, Moved, Traced, moved

@@ -26,11 +26,13 @@ def file_name(path: PathLike) -> str:
     return name
 
 
-def check_output(path: PathLike, suffix: str | tuple[str, ...] = "", inputs: Iterable[PathLike | None] = ()) -> str:
-    """Raise ValueError or OSError if `path` can't become a file that ends in `suffix`, or in one of several; return it as text.
+def check_output(
+    path: PathLike, suffix: str | tuple[str, ...] = "", inputs: Iterable[PathLike | None] = ()
+) -> str:
+    """Raise ValueError or OSError if `path` can't become a file that ends in `suffix`; return it as text.
 
-    It can't if it is one of the files `inputs`, by whatever name. Call this before long work whose result is
-    written there.
+    `suffix` may be several, of which one must fit. `path` can't be one of the files `inputs`, by whatever name.
+    Call this before long work whose result is written there.
     """
     name = file_name(path)
     if not name.lower().endswith(suffix):

@@ -49,7 +49,7 @@ def terrain_camera() -> Camera:
     return Camera(eye=(21_500, -36_500, 13_500), target=(13_700, -15_500, 1_700), up=(0, 0, 1), fov=31)
 
 
-# Colours of land by height, from the lowest place to the highest, and of steep slopes; linear RGB.
+# Colours of land by height, from the lowest place to the highest; linear RGB.
 HEIGHTS = (0.0, 0.12, 0.3, 0.5, 0.7, 1.0)
 LAND = (
     (0.10, 0.19, 0.05),  # meadows
@@ -59,11 +59,10 @@ LAND = (
     (0.30, 0.24, 0.13),
     (0.48, 0.42, 0.33),
 )
-ROCK = (0.30, 0.26, 0.21)
 
 
 def terrain_colours(vertices: Floats) -> NDArray[np.float32]:
-    """(v,3) linear colours of `terrain_mesh`: as of a map, green below and brown above, rock where it is steep."""
+    """(v,3) linear colours of `terrain_mesh`, as of a map: green below and brown above."""
     height = vertices[:, 2].astype(np.float64)
     share = (height - height.min()) / np.ptp(height)
     land = np.stack([np.interp(share, HEIGHTS, [colour[k] for colour in LAND]) for k in range(3)], axis=1)

@@ -12,7 +12,7 @@ from wive._internal.formats.colours import linear
 from wive._internal.host_arrays import host_array
 from wive._internal.interpolation import interpolated
 from wive._internal.picture import Image
-from wive._internal.precision import FLOAT32, Floats
+from wive._internal.precision import Floats
 from wive.hits import Hits
 
 GRAY = 0.6
@@ -53,11 +53,11 @@ def albedo_of(value: ArrayLike | None, faces: int, vertices: int) -> Albedo:
         array = np.broadcast_to(array, (faces, 1, 3))
     if array.shape not in ((vertices, 3), (faces, 3), (faces, 1, 3)):
         raise ValueError(
-            f"albedo must be one of gray, normals, or colours of shape (3,), ({vertices}, 3), one per vertex, "
-            f"or ({faces}, 3), one per triangle, got {array.shape}"
+            "albedo must be one of gray, normals, or colours of shape "
+            f"(3,), ({vertices}, 3), one per vertex, or ({faces}, 3), one per triangle, got {array.shape}"
         )
     kind: Literal["faces", "vertices"] = "vertices" if array.shape == (vertices, 3) else "faces"
-    colours = FLOAT32.array(array.reshape(-1, 3))
+    colours: Image = np.ascontiguousarray(array.reshape(-1, 3), np.float32)
     wrong = ~((colours >= 0) & (colours <= 1)).all(axis=1)
     if wrong.any():
         row = int(np.argmax(wrong))

@@ -16,7 +16,6 @@ from wive._internal import arguments
 from wive._internal.files import PathLike, atomic_write, check_output
 from wive._internal.host_arrays import host_array
 from wive._internal.picture import Image
-from wive._internal.precision import FLOAT32
 
 # The nearest surface in a PNG of depth is white, the farthest this gray, and nothing black.
 FARTHEST = 0.1
@@ -30,10 +29,10 @@ def write_picture(path: PathLike, image: ArrayLike, *, srgb: bool = True) -> Non
     """Write a picture, or a map of depth, to a file whose extension says the format; it is whole or absent.
 
     Arguments:
-        path: PNG (8 bits; values above 1 are white), EXR, TIFF (.tif, .tiff) and NPY (float32, as it is), or HDR
-            (Radiance RGBE: no negative values). PNG needs Pillow, EXR OpenEXR, TIFF tifffile.
-        image: (h,w,3) linear radiance or colours, or (h,w) depth as `render` returns it, inf where nothing is:
-            in a PNG white is near, dark gray far, and black nothing; HDR files hold no depth.
+        path: PNG (8 bits; values above 1 are white), EXR, TIFF (.tif, .tiff) and NPY (float32, as it is), or
+            HDR (Radiance RGBE: no negative values). PNG needs Pillow, EXR OpenEXR, TIFF tifffile.
+        image: (h,w,3) linear radiance or colours, or (h,w) depth as `render` returns it: in a PNG white is
+            near, dark gray far, and black nothing; HDR files hold no depth.
         srgb: for PNG: whether (h,w,3) are linear and are encoded for a screen. False writes 255 times the
             value, as for normals.
 
@@ -46,7 +45,7 @@ def write_picture(path: PathLike, image: ArrayLike, *, srgb: bool = True) -> Non
 
 
 def check_picture_output(path: PathLike, inputs: Iterable[PathLike | None] = (), shading: str = "") -> str:
-    """Raise unless `write_picture` can write to `path`, none of the files `inputs`: call it before rendering."""
+    """Raise unless `write_picture` can write to `path`, none of `inputs`; call it before rendering."""
     name = check_output(path, tuple(FORMATS), inputs)
     suffix = _suffix(name)
     if shading == "depth" and suffix == ".hdr":
@@ -72,7 +71,7 @@ def png_bytes(image: Image, srgb: bool = True) -> memoryview:
     """The content of a PNG file."""
     pillow = _imported(".png", *PILLOW)
     levels = np.empty(image.shape, np.uint8)
-    shown = image if image.ndim == 3 else _shades_of_depth(image)
+    shown: Image = image if image.ndim == 3 else _shades_of_depth(image)
     for row, linear in zip(levels, shown, strict=True):  # row by row: less memory than the picture takes
         within = np.clip(np.nan_to_num(linear, nan=0.0), 0, 1)
         row[:] = (_encoded(within) if srgb and image.ndim == 3 else within) * 255 + 0.5
@@ -92,7 +91,7 @@ def _shades_of_depth(depth: Image) -> Image:
     if not there.any():
         return np.zeros_like(depth)
     near, far = float(depth[there].min()), float(depth[there].max())
-    share = (np.where(there, depth, far) - near) / max(far - near, np.finfo(np.float32).tiny)
+    share = (np.where(there, depth, far) - near) / ((far - near) or 1.0)
     return np.where(there, 1 - (1 - FARTHEST) * share, 0).astype(np.float32)
 
 
@@ -113,8 +112,10 @@ def _write_exr(name: str, image: Image, srgb: bool) -> None:
 def _write_tiff(name: str, image: Image, srgb: bool) -> None:
     kind = "rgb" if image.ndim == 3 else "minisblack"
     tifffile = _imported(".tiff", *TIFFFILE)
+    content = io.BytesIO()  # the library asks files for their names
+    tifffile.imwrite(content, image, photometric=kind, software="wive")
     with atomic_write(name) as file:
-        tifffile.imwrite(file, image, photometric=kind, compression=None, software="wive")
+        file.write(content.getbuffer())
 
 
 def _write_npy(name: str, image: Image, srgb: bool) -> None:
@@ -178,5 +179,4 @@ def _values(image: ArrayLike) -> NDArray[np.float32]:
         raise ValueError(f"image must have shape (h, w, 3) or (h, w), got {array.shape}")
     if array.dtype.kind != "f":
         raise TypeError(f"image must be floats, got dtype {array.dtype}: divide 8-bit values by 255")
-    values: NDArray[np.float32] = FLOAT32.array(array)
-    return values
+    return np.ascontiguousarray(array, np.float32)

@@ -41,7 +41,7 @@ def _mix(words: list[UInt32]) -> None:
 
 def to_unit(bits: UInt32, dtype: np.dtype[np.floating]) -> Floats:
     """Numbers in [0, 1) from the high 24 bits."""
-    return (bits >> np.uint32(8)).astype(dtype) * dtype.type(UNIT_STEP)
+    return np.asarray((bits >> np.uint32(8)).astype(dtype) * dtype.type(UNIT_STEP))
 
 
 def cosine_directions(normals: Floats, random_a: Floats, random_b: Floats) -> Floats:

@@ -169,7 +169,7 @@ def dots(a: NDArray[np.float64], b: Floats) -> NDArray[np.float64]:
 
 def render_depth(image: Image, frame: Float64, scene: Scene, threads: int | None, advance: Advance) -> int:
     """Write t of the rays through the pixels' centres, inf on a miss, to image (h,w)."""
-    height, width = image.shape
+    height, width = map(int, image.shape)
     for begin, end in bands(height, width):
         eye, centre, right, top = frame
         x = (2 * np.arange(width) + 1) / width - 1

@@ -21,8 +21,9 @@ UNITS = "bytes", "KiB", "MiB", "GiB"
 
 def summary(scene: Scene) -> str:
     """HTML; without the picture if the scene has nothing to see, or Pillow is missing."""
+    left = 'style="text-align:left"'
     rows = "".join(
-        f'<tr><th style="text-align:left">{name}</th><td style="text-align:left">{html.escape(value)}</td></tr>'
+        f"<tr><th {left}>{name}</th><td {left}>{html.escape(value)}</td></tr>"
         for name, value in _numbers(scene).items()
     )
     picture = ""

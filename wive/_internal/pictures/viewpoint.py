@@ -16,8 +16,8 @@ from wive.scene import Scene
 
 Float64 = NDArray[np.float64]
 
-# Of larger scenes so many triangles, picked at random.
-MOST_TRIANGLES = 1 << 20
+# Of larger scenes some triangles at even steps, at least so many.
+MOST_TRIANGLES = 1 << 19
 # Places on surfaces by which views are compared, and eyes that are tried.
 SURFACE_SAMPLES = 1024
 COARSE_SAMPLES = 256
@@ -25,16 +25,16 @@ EYES = 768
 FINALISTS = 24
 YAWS = 24
 # Vertical degrees, and how far views indoors are tilted down.
-OUTDOOR_FOV, INDOOR_FOV = 40.0, 60.0
+OUTDOOR_FOV, INDOOR_FOV = 40.0, 65.0
 TILT = math.radians(6)
 # Steps about the best eye, as parts of the scene.
 REFINED = (0.25, 0.1)
 # What a view loses at four times the square of its share of the height off the middle.
 LOW_VIEW = 1.2
 # A view from inside must show so much more than the one from outside.
-ADVANTAGE = 1.3
-# Of a scene of which all but this share of triangles, at each end of each axis, is in a part smaller than that,
-# the part is framed, with some room about it.
+ADVANTAGE = 3.0
+# If all but this share of triangles, at each end of each axis, is in a part of the scene that is smaller than
+# this, the part is framed, with some room about it.
 FRINGE, SMALL_PART, FRINGE_ROOM = 0.01, 0.5, 0.08
 # Triangles whose corners are framed.
 MOST_OUTLINE = 20_000
@@ -42,12 +42,12 @@ MOST_OUTLINE = 20_000
 NEAR = 0.12
 # An eye is inside if less than this share of all directions misses.
 OPEN_SHARE = 0.25
-SPHERE_DIRECTIONS = 256
+SPHERE_DIRECTIONS, ENCLOSING_DIRECTIONS = 256, 48
 # Of paths that hit something: if more than this share stay in the scene, it is dark.
 SUNLESS = 0.98
 # Horizontal surfaces have this cosine, and must be so much more along z than along y for a room to have z up.
 LEVEL = 0.95
-MORE_LEVEL = 1.1
+MORE_LEVEL = 1.3
 
 
 class Places(NamedTuple):
@@ -64,13 +64,13 @@ class Places(NamedTuple):
 
     def first(self, count: int) -> Places:
         """The first ones."""
-        return Places(*(array[:count] for array in self[:3]), self.level)
+        return Places(self.points[:count], self.normals[:count], self.origins[:count], self.level)
 
 
 def default_camera(
     scene: Scene, up: ArrayLike | None = None, fov: float | None = None, aspect: float = 16 / 9
 ) -> Camera:
-    """The camera that frames the scene, or one in it if more of the surfaces' front sides is seen from there."""
+    """The camera that frames the scene, or one in it if far more of its front sides is seen from there."""
     framed = Camera.framing(scene.bounds, up, OUTDOOR_FOV if fov is None else fov, aspect)
     places = surface_places(scene)
     if places is None:
@@ -100,11 +100,10 @@ def _outline(scene: Scene, places: Places) -> Float64:
 
 
 def surface_places(scene: Scene) -> Places | None:
-    """Places on triangles picked at random, half of them in proportion to their areas; None if there are none."""
+    """Places on triangles picked at random, half of them in proportion to area; None if none has any."""
     random = np.random.default_rng(0)
-    every = len(scene) <= MOST_TRIANGLES
-    some = np.arange(len(scene)) if every else random.integers(0, len(scene), MOST_TRIANGLES)
-    faces = scene.faces if every else scene.faces[some]
+    step = max(1, len(scene) // MOST_TRIANGLES)
+    faces = scene.faces[::step]
     a, b, c = (scene.vertices[faces[:, k]].astype(np.float64) for k in range(3))
     with np.errstate(over="ignore", invalid="ignore"):
         crossed = crosses(b - a, c - a)
@@ -116,9 +115,10 @@ def surface_places(scene: Scene) -> Places | None:
     level = ((abs(crossed) > LEVEL * area[:, None]) * area[:, None]).sum(axis=0) / area.sum()
     half = SURFACE_SAMPLES // 2
     rows = np.empty(2 * half, np.intp)
-    rows[::2] = real[np.searchsorted(np.cumsum(area), random.random(half) * area.sum()).clip(max=len(real) - 1)]
+    until = np.cumsum(area)
+    rows[::2] = real[np.searchsorted(until[:-1], random.random(half) * until[-1])]
     rows[1::2] = real[random.integers(0, len(real), half)]
-    prim = some[rows].astype(np.int32)
+    prim = (step * rows).astype(np.int32)
     uv = random.random((len(prim), 2))
     uv = np.where(uv.sum(axis=1, keepdims=True) > 1, 1 - uv, uv).astype(scene.vertices.dtype)
     normals = surface_normals(scene.vertices, scene.faces, prim)
@@ -159,6 +159,9 @@ def _indoor_camera(
     heights = places.points @ upward
     size, (floor, ceiling) = _size(places), np.quantile(heights, (0.02, 0.98))
     eyes = _eyes(places)
+    eyes = eyes[_enclosed(scene, eyes)]
+    if len(eyes) == 0:
+        return None, 0.0
     coarse = places.first(COARSE_SAMPLES)
     best = np.argsort(-share_of(seen_from(scene, eyes, coarse)), kind="stable")[:FINALISTS]
     found, most = None, 0.0
@@ -180,6 +183,17 @@ def _indoor_camera(
             break
         eyes = np.asarray(found.eye) + reach * steps
     return found, most
+
+
+def _enclosed(scene: Scene, eyes: Float64) -> NDArray[np.bool_]:
+    """Which eyes hardly see the sky, as `stands_inside` judges it with fewer directions."""
+    directions = on_sphere(ENCLOSING_DIRECTIONS)
+    shape = (len(eyes), len(directions), 3)
+    real = scene.vertices.dtype
+    origins = np.broadcast_to(eyes[:, None], shape).astype(real)
+    return np.asarray(
+        (~scene.occluded(origins, np.broadcast_to(directions, shape).astype(real))).mean(axis=1) < OPEN_SHARE
+    )
 
 
 class Turns:
@@ -204,7 +218,7 @@ class Turns:
 
 
 def share_of(seen: NDArray[np.bool_]) -> Float64:
-    """(...,) the share of the places that is seen (...,p): the geometric mean of those by area and by triangle."""
+    """(...,) the share of the places seen (...,p): the geometric mean of those by area and by triangle."""
     areas, triangles = seen[..., ::2].mean(axis=-1), seen[..., 1::2].mean(axis=-1)
     return np.asarray(np.sqrt(areas * triangles))
 
@@ -228,7 +242,7 @@ def _size(places: Places) -> float:
 
 
 def _eyes(places: Places) -> Float64:
-    """Points spread evenly where the places are: Roberts's sequence of the plastic number's generalisation."""
+    """Points spread evenly where the places are: Roberts 2018, the R sequence in three dimensions."""
     low, high = np.quantile(places.points, (0.02, 0.98), axis=0)
     root = 1.2207440846057596
     steps = np.arange(1, EYES + 1)[:, None] / root ** np.arange(1, 4)
@@ -238,7 +252,7 @@ def _eyes(places: Places) -> Float64:
 def seen_from(scene: Scene, eyes: Float64, places: Places) -> NDArray[np.bool_]:
     """(e,p), whether the front side of each place is seen from each eye."""
     views = eyes[:, None] - places.points
-    in_front = (views * places.normals).sum(axis=2) > 0
+    in_front: NDArray[np.bool_] = (views * places.normals).sum(axis=2) > 0
     eye, place = np.nonzero(in_front)
     real = scene.vertices.dtype
     origins = places.origins[place].astype(real)

@@ -19,7 +19,8 @@ def read(data: bytes, name: str, folder: str | None) -> Colours | None:
     heads, counts = text.heads[is_vertex], text.counts[is_vertex] - 1
     if len(heads) and (counts == 6).all():
         return linear_guessed(text.reals(heads[:, None] + np.arange(4, 7), np.dtype(np.float64)))
-    is_use, is_face = text.same(text.heads, b"usemtl"), text.same(text.heads, b"f") | text.same(text.heads, b"fo")
+    is_use = text.same(text.heads, b"usemtl")
+    is_face = text.same(text.heads, b"f") | text.same(text.heads, b"fo")
     uses, faces = text.heads[is_use], text.heads[is_face]
     if folder is None or not len(uses):
         return None
@@ -44,16 +45,17 @@ def _rest(text: Text, head: int) -> bytes:
 def _paths(names: bytes, folder: str) -> list[str]:
     """The material files of a `mtllib`, which are one name with spaces, or several names."""
     for found in ([names], names.split()):
-        parts = [os.fsdecode(each).replace("\\", "/").removeprefix("./") for each in found]
-        paths = [
-            os.path.join(folder, part)
-            for part in parts
-            if not os.path.isabs(part) and ".." not in part.split("/") and ":" not in part and "\0" not in part
-        ]
+        parts = [os.fsdecode(each).replace("\\", "/") for each in found]
+        paths = [os.path.join(folder, part) for part in parts if _is_below(part)]
         paths = [path for path in paths if os.path.isfile(path)]
         if paths:
             return paths
     return []
+
+
+def _is_below(part: str) -> bool:
+    """Whether a path stays in its folder."""
+    return not (part.startswith("/") or ":" in part or "\0" in part or ".." in part.split("/"))
 
 
 def _diffuse(path: str) -> dict[bytes, tuple[float, ...]]:
