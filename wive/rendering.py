@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from typing import Literal, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from wive import _cpu
 from wive._internal import arguments
-from wive._internal.picture import Image, Look, Settings, ShadingOption, SkyOption
+from wive._internal.picture import Colours, How, Image, Look, Settings, Shading
 from wive._internal.pictures.albedo import Albedo, albedo_of
 from wive._internal.pictures.daylight import light_of, up_of_frame
 from wive._internal.pictures.image_files import write_picture as write_picture
@@ -22,6 +22,10 @@ from wive.camera import Camera, unit_vector
 from wive.scene import Scene
 from wive.sensors import PinholeCamera
 
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
+Perspective = Camera | PinholeCamera
 # Paths per band: some tenths of a second, so that the bar moves; Ctrl-C takes effect between bands.
 BAND_PATHS = 300_000
 CUDA_BAND_PATHS = 1 << 20
@@ -34,21 +38,17 @@ INDOOR_REACH = 1.3
 
 def render(
     scene: Scene,
-    camera: Camera | PinholeCamera | None = None,
+    camera: Perspective | None = None,
     *,
-    shading: ShadingOption = "auto",
+    shading: Shading = "auto",
     width: int = 1280,
     height: int = 720,
     spp: int = 32,
-    bounces: int = 8,
-    albedo: Literal["gray", "normals"] | ArrayLike | None = None,
-    sky: SkyOption = "day",
-    sun: ArrayLike | None = None,
-    exposure: float | Literal["auto"] = 0.0,
-    reach: float | None = None,
+    albedo: Colours = None,
     seed: int = 0,
     threads: int | None = None,
     progress: bool = False,
+    **how: Unpack[How],
 ) -> Image:
     """A picture of the scene.
 
@@ -61,21 +61,22 @@ def render(
             reaches the sky, or the scene is float64.
         width, height: in pixels.
         spp: samples per pixel: paths, or rays of ambient occlusion.
-        bounces: diffuse bounces after which a path ends.
         albedo: what surfaces reflect: linear colours from 0 to 1, (v,3) per vertex, (f,3) per triangle or
             (3,) for all, such as `load_colors` returns; or uint8, sRGB, as trimesh has them. If there are as
             many vertices as triangles, (f,1,3) is per triangle. "gray" is 0.6, "normals" is coloured by
             normal. None is gray in "path", white in "ao" and "headlight". Of no use for other shadings.
-        sky: "day", blue with a sun; "cloudy"; "white", of radiance 1 everywhere; "black". For "path".
-        sun: (3,) direction towards the sun, under any sky; None is on the left of the camera by day.
-        exposure: stops, powers of two by which the picture is brighter; "auto" makes most of it visible. For
-            "path", "ao" and "headlight".
-        reach: for "ao": the distance from which on a surface occludes nothing; one at half of it occludes by
-            half. None is inf, or if the camera stands inside, in proportion to the room.
         seed: another seed gives another picture of the same noise level. Random numbers come from (seed,
             pixel, sample, bounce) alone, so the picture depends on neither `threads` nor the scene's backend.
         threads: how many to use; None is every core. For CPU backends.
         progress: show a progress bar (needs tqdm).
+        bounces: 8 unless given: diffuse bounces after which a path ends.
+        sky: "day" unless given, blue with a sun; "cloudy"; "white", of radiance 1 everywhere; "black". For
+            "path".
+        sun: (3,) direction towards the sun, under any sky; None is on the left of the camera by day.
+        exposure: 0 unless given: stops, powers of two by which the picture is brighter; "auto" makes most of it visible. For
+            "path", "ao" and "headlight".
+        reach: for "ao": the distance from which on a surface occludes nothing; one at half of it occludes by
+            half. None is inf, or if the camera stands inside, in proportion to the room.
 
     Returns (height, width, 3) float32 linear radiance, top row first; of "normals" colours; of "depth"
     (height, width) float32, inf if nothing is there. `write_picture` writes them to files.
@@ -84,19 +85,18 @@ def render(
 
     >>> wive.write_picture("room.png", wive.render(scene, shading="ao"))
     """
+    unknown = how.keys() - How.__annotations__.keys()
+    if unknown:
+        raise TypeError(f"render() got an unexpected keyword argument {min(unknown)!r}")
     settings = Settings(
         shading=shading,
         width=width,
         height=height,
         spp=spp,
-        bounces=bounces,
         albedo=albedo,
-        sky=sky,
-        sun=sun,
-        exposure=exposure,
-        reach=reach,
         seed=seed,
         threads=threads,
+        **how,
     )
     return render_counted(scene, camera, settings, progress=arguments.flag("progress", progress)).image
 
@@ -110,12 +110,12 @@ class Picture(NamedTuple):
 
 
 def render_counted(
-    scene: Scene, camera: Camera | PinholeCamera | None, settings: Settings, *, progress: bool
+    scene: Scene, camera: Perspective | None, settings: Settings, *, progress: bool
 ) -> Picture:
     """The picture that `render` returns."""
     if not isinstance(scene, Scene):
         raise TypeError(f"scene must be a wive.Scene, got {type(scene).__name__}")
-    if not (camera is None or isinstance(camera, Camera | PinholeCamera)):
+    if not (camera is None or isinstance(camera, Perspective)):
         raise TypeError(
             "camera must be a wive.Camera or wive.PinholeCamera, or None for one that shows the scene, "
             f"got {type(camera).__name__}"
@@ -186,9 +186,7 @@ def _shade(
     return shader.render(image, frame, spp, advance)
 
 
-def _look(
-    settings: Settings, albedo: Albedo, frame: NDArray[np.float64], camera: Camera | PinholeCamera
-) -> Look:
+def _look(settings: Settings, albedo: Albedo, frame: NDArray[np.float64], camera: Perspective) -> Look:
     up = up_of_frame(frame) if isinstance(camera, PinholeCamera) else unit_vector("up", camera.up)
     light = light_of(settings.sky, settings.sun, frame, up)
     kind = "gray" if albedo.kind == "none" else albedo.kind

@@ -99,6 +99,11 @@ def test_bad_settings_are_named(options, kind, expected):
     assert str(error.value) == expected
 
 
+def test_an_argument_that_there_is_none_of_is_named():
+    with pytest.raises(TypeError, match=r"^render\(\) got an unexpected keyword argument 'shade'$"):
+        wive.render(wive.Scene(*sphere(0)), shade="ao")
+
+
 @pytest.mark.parametrize("albedo", ["gray", "normals"])
 def test_a_picture_is_the_same_on_any_backend_and_thread_count(usable_backends, monkeypatch, albedo):
     mesh = sphere(3)

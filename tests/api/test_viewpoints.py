@@ -40,7 +40,7 @@ def test_the_camera_stands_in_a_room_upright_and_sees_most_of_it(up, size):
     camera = wive.Camera.showing(wive.Scene(*mesh), aspect=ASPECT)
     assert is_within(camera, mesh)
     assert np.asarray(camera.up).tolist() == [0, up == 1, up == 2]
-    assert share_seen(mesh, camera) > 0.45
+    assert share_seen(mesh, camera) > 0.4
     height = (camera.eye[up] - mesh[0][:, up].min()) / np.ptp(mesh[0][:, up])
     assert 0.2 < height < 0.85
 

@@ -31,8 +31,8 @@ def check_output(
 ) -> str:
     """Raise ValueError or OSError if `path` can't become a file that ends in `suffix`; return it as text.
 
-    `suffix` may be several, of which one must fit. `path` can't be one of the files `inputs`, by whatever name.
-    Call this before long work whose result is written there.
+    `suffix` may be several, of which one must fit. `path` must be none of the files `inputs`, by whatever
+    name. Call this before long work whose result is written there.
     """
     name = file_name(path)
     if not name.lower().endswith(suffix):

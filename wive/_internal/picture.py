@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal, NamedTuple
+from typing import Literal, NamedTuple, TypedDict
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,8 +11,10 @@ from numpy.typing import ArrayLike, NDArray
 from wive._internal import arguments
 
 Image = NDArray[np.float32]
-ShadingOption = Literal["auto", "path", "ao", "headlight", "normals", "depth"]
-SkyOption = Literal["day", "cloudy", "white", "black"]
+Shading = Literal["auto", "path", "ao", "headlight", "normals", "depth"]
+Sky = Literal["day", "cloudy", "white", "black"]
+Colours = Literal["gray", "normals"] | ArrayLike | None
+Stops = float | Literal["auto"]
 
 SHADINGS = ("auto", "path", "ao", "headlight", "normals", "depth")
 SKIES = ("day", "cloudy", "white", "black")
@@ -22,19 +24,29 @@ LARGEST_SIDE = 65_536
 MOST_STOPS = 60
 
 
+class How(TypedDict, total=False):
+    """Settings that `render` takes by name alone, so that its signature fits on a screen."""
+
+    bounces: int
+    sky: Sky
+    sun: ArrayLike | None
+    exposure: Stops
+    reach: float | None
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Settings:
     """What a picture depends on besides scene and camera; the fields are the arguments of `render`."""
 
-    shading: ShadingOption = "auto"
+    shading: Shading = "auto"
     width: int = 1280
     height: int = 720
     spp: int = 32
     bounces: int = 8
-    albedo: Literal["gray", "normals"] | ArrayLike | None = None
-    sky: SkyOption = "day"
+    albedo: Colours = None
+    sky: Sky = "day"
     sun: ArrayLike | None = None
-    exposure: float | Literal["auto"] = 0.0
+    exposure: Stops = 0.0
     reach: float | None = None
     seed: int = 0
     threads: int | None = None

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 import os
-import tempfile
 from collections.abc import Callable, Iterable
 from importlib import import_module
 from typing import Any, BinaryIO
@@ -96,6 +95,8 @@ def _shades_of_depth(depth: Image) -> Image:
 
 
 def _write_exr(name: str, image: Image, srgb: bool) -> None:
+    import tempfile
+
     openexr = _imported(".exr", *OPENEXR)
     header = {"compression": openexr.ZIP_COMPRESSION, "type": openexr.scanlineimage}
     with tempfile.TemporaryDirectory(prefix="wive-") as folder:  # the library writes to names alone
