@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from wive import _cpu
 from wive._internal import arguments
@@ -16,7 +16,8 @@ from wive._internal.pictures.daylight import light_of, up_of_frame
 from wive._internal.pictures.image_files import write_picture as write_picture
 from wive._internal.pictures.image_files import write_png as write_png
 from wive._internal.pictures.shades import AmbientOcclusion, Headlight, NormalColours, render_depth
-from wive._internal.pictures.viewpoint import default_camera, reaches_sky, stands_inside
+from wive._internal.pictures.surroundings import Sight, reaches_sky, stands_inside
+from wive._internal.pictures.viewpoint import default_camera
 from wive._internal.progress import progress_bar
 from wive.camera import Camera, unit_vector
 from wive.scene import Scene
@@ -73,8 +74,8 @@ def render(
         sky: "day" unless given, blue with a sun; "cloudy"; "white", of radiance 1 everywhere; "black". For
             "path".
         sun: (3,) direction towards the sun, under any sky; None is on the left of the camera by day.
-        exposure: 0 unless given: stops, powers of two by which the picture is brighter; "auto" makes most of it visible. For
-            "path", "ao" and "headlight".
+        exposure: 0 unless given: stops, powers of two by which the picture is brighter; "auto" makes most of
+            it visible. For "path", "ao" and "headlight".
         reach: for "ao": the distance from which on a surface occludes nothing; one at half of it occludes by
             half. None is inf, or if the camera stands inside, in proportion to the room.
 
@@ -133,7 +134,7 @@ def render_counted(
     _cpu.expect_memory(height * width * 3 * np.dtype(np.float32).itemsize)
     image = np.zeros((height, width, *channels), np.float32)
     if camera is None:
-        camera = default_camera(scene, aspect=width / height)
+        camera = default_camera(scene, aspect=width / height, threads=settings.threads)
     frame = camera._frame(width, height)
     shading, reach = _resolved(scene, frame, settings)
     title = "rendering"
@@ -151,14 +152,14 @@ def render_counted(
 
 def _resolved(scene: Scene, frame: NDArray[np.float64], settings: Settings) -> tuple[str, float]:
     """The shading that "auto" means, and the reach of ambient occlusion that None means."""
-    shading, reach = settings.shading, settings.reach
+    shading, reach, sight = settings.shading, settings.reach, Sight(scene, settings.threads)
     if shading not in ("auto", "ao") or (shading == "ao" and reach is not None):
         return shading, np.inf if reach is None else reach
-    inside, around = stands_inside(scene, frame[0])
+    inside, around = stands_inside(sight, frame[0])
     if reach is None:
         reach = INDOOR_REACH * around if inside else np.inf
     if shading == "auto":
-        is_dark = inside or scene.precision != "float32" or not reaches_sky(scene, frame, settings.bounces)
+        is_dark = inside or scene.precision != "float32" or not reaches_sky(sight, frame, settings.bounces)
         shading = "ao" if is_dark else "path"
     return shading, reach
 

@@ -127,6 +127,18 @@ def test_fewer_samples_than_a_points_rays_are_traced_as_such():
     assert wive.rendering.render_counted(scene, DOWN, settings, progress=False).rays == 2 * 64
 
 
+@pytest.mark.parametrize("shading", ["auto", "path", "ao", "headlight", "normals", "depth"])
+def test_all_rays_of_a_picture_are_traced_on_the_threads_that_are_asked_for(monkeypatch, shading):
+    """Queries whose options are all the usual ones take a shorter way."""
+    usual = []
+    scene = wive.Scene(*room())
+    monkeypatch.setattr(type(scene._tracer), "at_once", lambda self, *arguments: usual.append(arguments))
+    wive.render(scene, shading=shading, threads=1, **SMALL)
+    assert usual == []
+    wive.render(scene, shading=shading, **SMALL)
+    assert usual
+
+
 def test_a_picture_shows_one_shape_whatever_refits_happen_meanwhile(monkeypatch):
     vertices, faces = FLOOR
     scene = wive.Scene(vertices, faces)

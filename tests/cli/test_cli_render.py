@@ -64,6 +64,21 @@ def test_colours_of_the_file_are_shown_unless_others_are_asked_for(tmp_path):
     assert np.ptp(found["normals"], axis=2).max() > 0.1
 
 
+def test_printers_files_have_z_up_and_gltf_has_y_up(tmp_path):
+    """A tall post: upright in the picture, higher than wide, or lying and wider than high."""
+    trimesh = pytest.importorskip("trimesh")
+    for name, axis in (("a.stl", 2), ("a.3mf", 2), ("a.glb", 1), ("a.obj", 1)):
+        extents = np.ones(3)
+        extents[axis] = 6
+        if name == "a.3mf":
+            pytest.importorskip("networkx") and pytest.importorskip("lxml")
+        trimesh.creation.box(extents).export(tmp_path / name)
+        size = ("--width", 40, "--height", 40, "--spp", 1, "--shading", "depth")
+        assert run("render", tmp_path / name, "-o", tmp_path / "a.npy", *size) == 0
+        rows, columns = np.nonzero(np.isfinite(np.load(tmp_path / "a.npy")))
+        assert np.ptp(rows) > 2 * np.ptp(columns), name
+
+
 def test_png_of_normals_holds_their_values(files):
     pillow = pytest.importorskip("PIL.Image")
     for name in ("a.png", "a.npy"):

@@ -19,6 +19,7 @@ from wive._internal.npz_writer import write_npz
 from wive._internal.npzfile import Npz, check_input, open_npy_or_npz
 from wive._internal.picture import Settings
 from wive._internal.pictures.image_files import check_picture_output, write_picture
+from wive._internal.pictures.viewpoint import default_camera
 from wive._internal.precision import FLOAT64, Floats, Real, real_named
 from wive._internal.progress import progress_bar
 from wive._internal.terrain import terrain_camera, terrain_colours, terrain_mesh
@@ -34,6 +35,14 @@ from wive.scene import Scene
 
 # Sine of an angle: a nearer `up` is along the view.
 ALONG_VIEW = 1e-6
+# Printers stand parts on the xy plane; glTF's specification has y up.
+USUAL_UPS = {
+    ".stl": (0.0, 0.0, 1.0),
+    ".3mf": (0.0, 0.0, 1.0),
+    ".gltf": (0.0, 1.0, 0.0),
+    ".glb": (0.0, 1.0, 0.0),
+    ".vrm": (0.0, 1.0, 0.0),
+}
 # Shadings that show no colours of surfaces.
 COLOURLESS = "normals", "depth"
 # Rays per step of the progress bar.
@@ -173,10 +182,11 @@ def _camera(options: Namespace, scene: Scene) -> Camera:
         camera = terrain_camera()
     else:
         aspect = options.width / options.height
+        up = options.up or _usual_up(options.mesh)
         if options.eye is None and options.target is None:
-            camera = Camera.showing(scene, options.up, options.fov, aspect)
+            camera = default_camera(scene, up, options.fov, aspect, options.threads)
         else:
-            camera = Camera.framing(scene.bounds, options.up, aspect=aspect, **fov)
+            camera = Camera.framing(scene.bounds, up, aspect=aspect, **fov)
     given = {name: getattr(options, name) for name in ("eye", "target", "up", "fov")}
     given = {name: value for name, value in given.items() if value is not None}
     if "up" not in given:  # a view along the automatic up, as from above, has the next axis up
@@ -186,6 +196,11 @@ def _camera(options: Namespace, scene: Scene) -> Camera:
             if np.max(abs(aside)) <= ALONG_VIEW * np.max(abs(view)):
                 given["up"] = np.roll(camera.up, -1)
     return replace(camera, **given)
+
+
+def _usual_up(mesh: str) -> tuple[float, float, float] | None:
+    """What is up in files of a format by convention; None if programs differ."""
+    return next((up for ending, up in USUAL_UPS.items() if mesh.lower().endswith(ending)), None)
 
 
 def _read_rays(name: str, real: Real, exact: bool) -> tuple[Floats, ...]:
