@@ -47,7 +47,7 @@ def test_the_warp_pages_programs_run(number: int, tmp_path: Path, device: str) -
     assert run(programs("docs/warp.md")[number], tmp_path) != ""
 
 
-PAGES = "docs/sensors.md", "docs/several_meshes.md", "docs/terrain.md"
+PAGES = "docs/pictures.md", "docs/sensors.md", "docs/several_meshes.md", "docs/terrain.md"
 PROGRAMS = [(page, i) for page in PAGES for i in range(len(programs(page)))]
 
 
