@@ -172,7 +172,7 @@ def _shade(
     albedo: Albedo,
     reach: float,
     settings: Settings,
-    advance: Callable[[float], object],
+    advance: Callable[[int], object],
 ) -> int:
     """Render by the scene's queries."""
     spp, threads = settings.spp, settings.threads
@@ -196,7 +196,7 @@ def _look(settings: Settings, albedo: Albedo, frame: NDArray[np.float64], camera
 
 
 def _trace_paths(
-    scene: Scene, frame: Image, image: Image, look: Look, advance: Callable[[float], object]
+    scene: Scene, frame: Image, image: Image, look: Look, advance: Callable[[int], object]
 ) -> int:
     render_rows = scene._tracer.rows_renderer(frame, image, look)
     rays = 0

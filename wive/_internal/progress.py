@@ -8,7 +8,7 @@ from contextlib import contextmanager
 @contextmanager
 def progress_bar(
     total: int, unit: str, title: str, *, show: bool = True
-) -> Iterator[Callable[[float], object]]:
+) -> Iterator[Callable[[int], object]]:
     """Show a bar while the block runs; the function it yields advances it by a number of units.
 
     Without tqdm (extra `render`) the work goes on with no bar.

@@ -23,7 +23,7 @@ BAND_PIXELS = 1 << 16
 OCCLUSION_RAYS = 4
 
 Float64 = NDArray[np.float64]
-Advance = Callable[[float], object]
+Advance = Callable[[int], object]
 
 
 class Band:
@@ -85,7 +85,7 @@ class Shader:
                     sums += self.background
                 sums[hit] += values - self.background
                 rays += len(band.pixels) + traced
-                advance((end - begin) / samples)
+                advance(_share(end - begin, sample + 1, samples) - _share(end - begin, sample, samples))
             image[begin:end] = (sums / samples).reshape(end - begin, width, 3)
         return rays
 
@@ -153,6 +153,11 @@ class AmbientOcclusion(Shader):
             return np.asarray(~self.scene.occluded(origins, directions, threads=self.threads), np.float64)
         t = self.scene.intersect(origins, directions, tmax=self.reach, threads=self.threads).t
         return np.minimum(t.astype(np.float64) / self.reach, 1.0)
+
+
+def _share(rows: int, done: int, samples: int) -> int:
+    """How many rows so many samples of a band are worth, in whole numbers for the bar."""
+    return rows * done // samples
 
 
 def bands(height: int, width: int) -> Iterator[tuple[int, int]]:
