@@ -126,9 +126,14 @@ def render_counted(
             "scene must be of float32 vertices to be path-traced, got float64: use another shading, or "
             "make one with (vertices - vertices.mean(axis=0)).astype(np.float32)"
         )
-    scene = scene._at_rest()  # one picture shows one shape, whatever refits happen meanwhile
+    with _cpu.DefaultFloats():  # the caller's floating-point environment would round otherwise
+        return _rendered(scene._at_rest(), camera, settings, progress)
+
+
+def _rendered(scene: Scene, camera: Perspective | None, settings: Settings, progress: bool) -> Picture:
+    """The picture of a scene that no refit changes meanwhile."""
     arguments.refuse_lacking(scene.backend, scene._tracer.lacks, {"threads": settings.threads})
-    albedo = albedo_of(settings.albedo, len(scene), len(scene.vertices))
+    albedo = albedo_of(settings.albedo, scene)
     width, height = settings.width, settings.height
     channels = () if settings.shading == "depth" else (3,)
     _cpu.expect_memory(height * width * 3 * np.dtype(np.float32).itemsize)

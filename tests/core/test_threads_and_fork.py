@@ -107,7 +107,8 @@ def trace(scene: wive.Scene) -> None:
 
 
 def draw(scene: wive.Scene) -> None:
-    wive.render(scene, width=512, height=512, spp=2, threads=1)
+    camera = wive.Camera(eye=(0, 0, 4), target=(0, 0, 0))
+    wive.render(scene, camera, shading="path", width=512, height=512, spp=2, threads=1)
 
 
 @pytest.mark.parametrize("work", [trace, draw])

@@ -14,6 +14,7 @@ from wive._internal.interpolation import interpolated
 from wive._internal.picture import Image
 from wive._internal.precision import Floats
 from wive.hits import Hits
+from wive.scene import Scene
 
 GRAY = 0.6
 
@@ -35,12 +36,13 @@ class Albedo(NamedTuple):
         return GRAY if self.kind == "gray" else 1.0
 
 
-def albedo_of(value: ArrayLike | None, faces: int, vertices: int) -> Albedo:
+def albedo_of(value: ArrayLike | None, scene: Scene) -> Albedo:
     """The argument `albedo`, checked; None is "none"."""
     if value is None:
         return Albedo("none")
     if isinstance(value, str):
         return Albedo("normals" if value == "normals" else "gray")
+    faces, vertices = len(scene), len(scene.vertices)
     array = arguments.nan_if_masked(arguments.array_of_numbers("albedo", host_array("albedo", value)))
     if array.dtype == np.uint8 and array.ndim and array.shape[-1] in (3, 4):  # as trimesh and files have them
         array = linear(array[..., :3], 255)

@@ -7,6 +7,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from wive import _cpu
 from wive._internal.pictures.places import Places, in_view, seen_from, share_of, surface_places
 from wive._internal.pictures.surroundings import Sight, enclosed
 from wive.camera import Camera, framing_points, ground_axes, unit_vector
@@ -45,8 +46,13 @@ def default_camera(
     threads: int | None = None,
 ) -> Camera:
     """The camera that frames the scene, or one in it if far more of its front sides is seen from there."""
+    with _cpu.DefaultFloats():  # as for pictures
+        return _best_camera(Sight(scene, threads), up, fov, aspect)
+
+
+def _best_camera(sight: Sight, up: ArrayLike | None, fov: float | None, aspect: float) -> Camera:
+    scene = sight.scene
     framed = Camera.framing(scene.bounds, up, OUTDOOR_FOV if fov is None else fov, aspect)
-    sight = Sight(scene, threads)
     places = surface_places(sight)
     if places is None:
         return framed
