@@ -17,12 +17,15 @@ import pytest
 
 wp = pytest.importorskip("warp")
 
+from support.ptx.launching import ptx_of
+
 from wive.warp_kernels.launching import sorting
 from wive.warp_kernels.launching.kernels import make_kernel
 from wive.warp_kernels.launching.launch import default_block_dim
 
 ARCHITECTURES = (80, 90, 100)
 STACK = 96
+BLOCK = 256  # Warp's own
 QUERIES = ("closest", "any", "count", "all")
 
 # Every query on one architecture, and on the others those two that hold nearly all there is to compile; exact
@@ -100,13 +103,6 @@ class Usage:
     spills: int
 
 
-def compiled_ptx(module: wp.Module, architecture: int, folder: Path) -> str:
-    """The PTX of a module, as NVRTC wrote it. Raises if CUDA code does not compile."""
-    wp.compile_aot_module(module, arch=architecture, module_dir=str(folder), use_ptx=True)
-    (path,) = folder.glob(f"*.sm{architecture}.ptx")
-    return path.read_text().rstrip("\0")
-
-
 def find_ptxas() -> Iterator[Path]:
     """Every ptxas there is to try, in the order of preference."""
     if asked := os.environ.get("WIVE_PTXAS"):
@@ -160,8 +156,7 @@ def test_kernel_compiles_for_cuda_within_its_limits(
     query: str, architecture: int, accuracy: str, lanes: int, tmp_path: Path
 ) -> None:
     kernel = make_kernel(query, accuracy, lanes, STACK)
-    kernel.module.options["block_dim"] = default_block_dim(lanes)
-    ptx = compiled_ptx(kernel.module, architecture, tmp_path)
+    ptx = ptx_of(kernel, default_block_dim(lanes), architecture)
     # The CUDA branches are what was compiled: the collectives of a group, wide loads of a thread.
     assert ("redux.sync" in ptx) == (lanes == 1)
     assert ("ld.global.nc.v4" in ptx) == (lanes == 8)
@@ -178,8 +173,7 @@ def test_kernel_for_compressed_nodes_compiles_within_its_limits(
     query: str, accuracy: str, lanes: int, tmp_path: Path
 ) -> None:
     kernel = make_kernel(query, accuracy, lanes, STACK, nodes="compressed")
-    kernel.module.options["block_dim"] = default_block_dim(lanes)
-    usage = assemble(compiled_ptx(kernel.module, 90, tmp_path), 90, tmp_path)
+    usage = assemble(ptx_of(kernel, default_block_dim(lanes)), 90, tmp_path)
     assert usage.spills == 0
     assert usage.stack <= stack_limit(query, accuracy, lanes)
     assert usage.registers <= COMPRESSED_REGISTERS[accuracy, lanes]
@@ -192,8 +186,7 @@ def test_kernel_for_float64_scenes_compiles_within_its_limits(
     query: str, architecture: int, accuracy: str, nodes: str, lanes: int, tmp_path: Path
 ) -> None:
     kernel = make_kernel(query, accuracy, lanes, STACK, nodes=nodes, precision="float64")
-    kernel.module.options["block_dim"] = default_block_dim(lanes)
-    ptx = compiled_ptx(kernel.module, architecture, tmp_path)
+    ptx = ptx_of(kernel, default_block_dim(lanes), architecture)
     assert ("ld.global.nc.v2.f64" in ptx) == (lanes == 8)
     usage = assemble(ptx, architecture, tmp_path)
     assert usage.spills == 0
@@ -203,11 +196,9 @@ def test_kernel_for_float64_scenes_compiles_within_its_limits(
 
 @pytest.mark.timeout(120)
 @pytest.mark.parametrize("lanes", [8, 1])
-def test_kernel_with_counters_compiles_for_cuda(lanes: int, tmp_path: Path) -> None:
+def test_kernel_with_counters_compiles_for_cuda(lanes: int) -> None:
     for query in ("closest", "any", "count"):
-        folder = tmp_path / query
-        folder.mkdir()
-        compiled_ptx(make_kernel(query, "watertight", lanes, STACK, True).module, 90, folder)
+        ptx_of(make_kernel(query, "watertight", lanes, STACK, True), default_block_dim(lanes))
 
 
 @pytest.mark.timeout(120)
@@ -215,7 +206,7 @@ def test_kernel_with_counters_compiles_for_cuda(lanes: int, tmp_path: Path) -> N
     "kernel", [sorting.sort_kernel("float32"), sorting.sort_kernel("float64"), sorting.shift_counts]
 )
 def test_kernel_that_orders_hits_keeps_them_in_registers(kernel: wp.Kernel, tmp_path: Path) -> None:
-    usage = assemble(compiled_ptx(kernel.module, 90, tmp_path), 90, tmp_path)
+    usage = assemble(ptx_of(kernel, BLOCK), 90, tmp_path)
     assert usage.spills == usage.stack == 0
     assert usage.registers <= 64
 
@@ -245,14 +236,14 @@ def planted_spill(x: wp.array(dtype=wp.float32)):
 
 
 @pytest.mark.timeout(60)
-def test_guard_fails_on_a_broken_cuda_branch(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+def test_guard_fails_on_a_broken_cuda_branch(capfd: pytest.CaptureFixture[str]) -> None:
     array = wp.ones(1, dtype=wp.uint32, device="cpu")
     wp.launch(planted_fault, 1, inputs=[array], device="cpu")  # the CPU branch has nothing wrong with it
     with pytest.raises(Exception, match=r"CUDA|NVRTC|build"):
-        compiled_ptx(planted_fault.module, 90, tmp_path)
+        ptx_of(planted_fault, BLOCK)
 
 
 @pytest.mark.timeout(60)
 def test_guard_sees_memory_that_a_kernel_falls_back_to(tmp_path: Path) -> None:
-    usage = assemble(compiled_ptx(planted_spill.module, 90, tmp_path), 90, tmp_path)
+    usage = assemble(ptx_of(planted_spill, BLOCK), 90, tmp_path)
     assert usage.stack >= 96 * 4

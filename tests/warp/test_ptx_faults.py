@@ -1,0 +1,93 @@
+"""The runner of PTX sees the faults that a GPU would run without a word: planted ones are reported."""
+
+import dataclasses
+import re
+import shutil
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+wp = pytest.importorskip("warp")
+
+from support.meshes import random_rays, soup
+from support.ptx import HostKernel, MachineError, on_the_host
+from support.ptx.instructions import rule_of
+from support.ptx.launching import COMPILER, ptx_of
+from support.warp_launches import INFINITE, ZERO
+
+from wive import _cpu, warp_kernels
+from wive.warp_kernels.launching.kernels import make_kernel
+from wive.warp_kernels.launching.launch import default_block_dim
+
+pytestmark = [
+    pytest.mark.timeout(120),
+    pytest.mark.skipif(shutil.which(COMPILER[0]) is None, reason=f"no C++ compiler {COMPILER[0]}"),
+]
+
+RAYS, LIMITS = random_rays(64, 2, 0.0, 1.0), (ZERO, INFINITE)
+STACK = 96  # as in test_warp_cuda_aot.py, so that the kernel is compiled to PTX once
+
+
+def trace(changed: Callable[[str], str]) -> np.ndarray:
+    """The prims of rays through a soup, by the PTX of eight threads per ray with a change."""
+    kernel = make_kernel("closest", "watertight", 1, STACK)
+    ptx = ptx_of(kernel, default_block_dim(1))
+    changed_ptx = changed(ptx)
+    assert changed_ptx != ptx
+    broken = HostKernel(changed_ptx, f"{kernel.get_mangled_name()}_cuda_kernel_forward")
+    tree = dataclasses.replace(warp_kernels.upload(_cpu.Bvh(*soup(3000, 1)), "cpu"), stack=STACK)
+    rays = [wp.array(values, dtype=wp.vec3, device="cpu") for values in RAYS]
+    limits = [wp.array(values, dtype=wp.float32, device="cpu") for values in LIMITS]
+    t, prim = wp.zeros(64, dtype=wp.float32, device="cpu"), wp.zeros(64, dtype=wp.int32, device="cpu")
+    with on_the_host(lambda kernel, block_dim: broken):
+        warp_kernels.launch_closest(tree, *rays, *limits, t, prim, lanes=1)
+    return prim.numpy()
+
+
+def without_sync(place: int) -> Callable[[str], str]:
+    """Drops the bar.warp.sync at that place of the text."""
+
+    def changed(ptx: str) -> str:
+        found = list(re.finditer(r"bar\.warp\.sync[^;]*;", ptx))
+        return ptx[: found[place].start()] + ptx[found[place].end() :]
+
+    return changed
+
+
+def with_mask(of_group: int, shift: int) -> Callable[[str], str]:
+    """Replaces the mask of a ray's eight threads, 255 shifted by their first lane."""
+
+    def changed(ptx: str) -> str:
+        found = re.search(r"and\.b32\s+(%r\d+), %r\d+, 24;\s+mov\.u32\s+(%r\d+), 255;", ptx)
+        assert found is not None
+        planted = found[0].replace(" 24;", f" {shift};").replace(" 255;", f" {of_group};")
+        return ptx.replace(found[0], planted)
+
+    return changed
+
+
+@pytest.mark.parametrize("place", [1, -1])
+def test_a_dropped_barrier_is_a_race(place: int) -> None:
+    """Behind the pushes of a node, and at the end of a step."""
+    with pytest.raises(MachineError, match=r"race: .* of shared memory"):
+        trace(without_sync(place))
+
+
+def test_a_mask_of_other_threads_is_refused() -> None:
+    with pytest.raises(MachineError, match="mask 000000ff does not name its own lane"):
+        trace(with_mask(255, 0))
+
+
+def test_a_mask_of_all_threads_gives_wrong_hits() -> None:
+    """Nothing is wrong with how the threads meet, but four rays exchange their nodes."""
+    expected = _cpu.Bvh(*soup(3000, 1)).intersect("scalar", *RAYS, *LIMITS)[1]
+    assert (trace(with_mask(-1, 0)) != expected).any()
+
+
+@pytest.mark.parametrize(
+    "opcode", ["add.ftz.f32", "div.approx.f32", "fma.rz.f32", "cvt.rz.f32.f64", "shfl.sync.b32"]
+)
+def test_instructions_that_are_not_known_are_refused(opcode: str) -> None:
+    with pytest.raises(ValueError, match=f"unknown instruction {opcode}"):
+        rule_of(opcode)
