@@ -10,7 +10,7 @@ Launches over batches of rays, as `wive.Scene` uses them:
     check(tree)                                # waits; raises if a kernel met a corrupt tree
 
 Functions for users' own kernels take `tree.handle`, whose type depends on the accuracy: `Bvh` for watertight
-trees, `FastBvh` for fast ones, `ExactBvh` for exact ones.
+trees, `FastBvh` for fast ones, `ExactBvh` for exact ones; in float64 scenes `Bvh64` and `FastBvh64`.
 
     @wp.kernel
     def shade(bvh: Bvh, origins: wp.array[wp.vec3], directions: wp.array[wp.vec3], depth: wp.array[float]):
@@ -31,21 +31,25 @@ from wive.warp_kernels.launching.launch import (
     launch_count,
     scan_counts,
 )
-from wive.warp_kernels.tree.handle import Bvh, ExactBvh, FastBvh, Hit
+from wive.warp_kernels.tree.handle import Bvh, Bvh64, ExactBvh, FastBvh, FastBvh64, Hit, Hit64
 from wive.warp_kernels.tree.tree import CorruptTreeError, Tree, check, upload
 
 if TYPE_CHECKING:
     from wive.warp_kernels.functions.functions import any_hit, closest_hit, count_hits
-    from wive.warp_kernels.functions.gradients import SurfaceHit, differentiable_hit
+    from wive.warp_kernels.functions.gradients import SurfaceHit, SurfaceHit64, differentiable_hit
 
 __all__ = [
     "MOST_HITS",
     "Bvh",
+    "Bvh64",
     "CorruptTreeError",
     "ExactBvh",
     "FastBvh",
+    "FastBvh64",
     "Hit",
+    "Hit64",
     "SurfaceHit",
+    "SurfaceHit64",
     "Tree",
     "any_hit",
     "check",
@@ -62,7 +66,7 @@ __all__ = [
 
 # The functions for users' kernels are made when first used: they take a tenth of a second or more.
 _FUNCTIONS = {"any_hit", "closest_hit", "count_hits"}
-_GRADIENTS = {"SurfaceHit", "differentiable_hit"}
+_GRADIENTS = {"SurfaceHit", "SurfaceHit64", "differentiable_hit"}
 
 
 def __getattr__(name: str) -> Any:

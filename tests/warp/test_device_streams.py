@@ -5,15 +5,20 @@ library's `on_stream` block, which on CUDA sends them to the library's current s
 """
 
 import contextlib
+import sys
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from support.meshes import random_rays, sphere
 
 import wive
+from wive import _cpu
 from wive._internal import arrays
 
 wp = pytest.importorskip("warp")
+
+from wive.warp_kernels import launch_all, launch_count, scan_counts, upload
 
 MESH = sphere(2)
 RAYS = random_rays(50, seed=1)
@@ -116,6 +121,86 @@ def test_scenes_are_on_their_device_before_a_query_on_any_stream(device, monkeyp
     events.clear()
     hits.points()
     assert events.count("array") == 1  # the points: the mesh is on the device already
+
+
+def test_an_upload_waits_for_its_last_launch(device, monkeypatch):
+    events = []
+    launch, wait = wp.launch, wp.synchronize_stream
+    monkeypatch.setattr(wp, "launch", lambda *a, **k: (events.append("launch"), launch(*a, **k)))
+    monkeypatch.setattr(wp, "synchronize_stream", lambda *a: (events.append("wait"), wait(*a)))
+    upload(_cpu.Bvh(*MESH), device)
+    assert events == ["launch", "wait"]
+
+
+def test_the_hits_of_launch_all_are_allocated_on_the_stream_that_it_is_given(device, monkeypatch):
+    """There they are freed as well: memory is reused in the order of a stream."""
+    given, current, found = object(), [None], []
+
+    @contextlib.contextmanager
+    def scoped(stream, sync_enter=True):
+        current.append(stream)
+        yield
+        current.pop()
+
+    def recorded(function):
+        return lambda *a, **k: (found.append((current[-1], k.get("stream"))), function(*a, **k))[1]
+
+    tree, rays = upload(_cpu.Bvh(*MESH), device), [on_device(rows, device) for rows in RAYS]
+    rays += [wp.full(1, limit, dtype=wp.float32, device=device) for limit in (0.0, np.inf)]
+    counts = wp.zeros(50, dtype=wp.int32, device=device)
+    launch_count(tree, *rays, counts)
+    offsets = scan_counts(counts)
+    outputs = [wp.empty(int(offsets.numpy()[-1]), dtype=dtype) for dtype in (wp.float32, wp.int32, wp.vec2)]
+    monkeypatch.setattr(wp, "ScopedStream", scoped)
+    for name in ("empty", "launch"):
+        monkeypatch.setattr(wp, name, recorded(getattr(wp, name)))
+    launch_all(tree, *rays, counts, offsets, *outputs, stream=given)
+    assert found == [(given, None)] * 3  # hits, their list, the sort
+
+
+@pytest.mark.parametrize("capturing", [False, True])
+def test_work_on_a_stream_of_torch_goes_before_what_warp_does_next(monkeypatch, capturing):
+    """Warp frees memory on its own stream, behind the work; a graph of torch holds no other stream."""
+    made = []
+    stream = SimpleNamespace(is_capturing=capturing)
+    torch = SimpleNamespace(cuda=SimpleNamespace(current_stream=lambda device: ("torch's", device)))
+    monkeypatch.setitem(sys.modules, "torch", torch)
+    monkeypatch.setattr(wp, "stream_from_torch", lambda found: made.append(found) or stream)
+    monkeypatch.setattr(wp, "ScopedStream", lambda *a, **k: made.append((*a, k)))
+    arrays.TORCH.on_stream("cuda:0")
+    assert made == [
+        ("torch's", "cuda:0"),
+        (stream, {"sync_enter": False, "sync_exit": not capturing}),
+    ]
+
+
+def test_a_graph_holds_queries_and_what_their_hits_compute(device):
+    """Replayed, it gives the answers for the rays that its arrays hold by then."""
+    scene = wive.Scene(*MESH, device=device)
+    origins, directions = (on_device(rows, device) for rows in RAYS)
+    up = on_device(NORMALS, device)
+
+    def everything():
+        hits = scene.intersect(origins, directions)
+        names = ("t", "prim", "uv", "mask", "geom", "geom_prim", "error_bound", "front")
+        return {
+            **{name: getattr(hits, name) for name in names},
+            **{name: getattr(hits, name)() for name in ("points", "normals", "cosines")},
+            "spawn": hits.spawn(up),
+            "occluded": scene.occluded(origins, directions),
+            "count": scene.count(origins, directions),
+        }
+
+    everything()  # kernels are compiled and the mesh is on the device
+    with wp.ScopedCapture(device=device) as capture:
+        answers = everything()
+    moved = random_rays(50, seed=2)
+    for array, rows in zip((origins, directions), moved, strict=True):
+        array.assign(rows)
+    wp.capture_launch(capture.graph)
+    for name, wanted in everything().items():
+        np.testing.assert_array_equal(answers[name].numpy(), wanted.numpy(), err_msg=name)
+    assert len(np.unique(answers["prim"].numpy())) > 5
 
 
 def test_the_mesh_is_copied_to_the_device_when_first_used(device):

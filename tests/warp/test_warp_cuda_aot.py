@@ -21,11 +21,12 @@ from support.ptx.launching import ptx_of
 
 from wive.warp_kernels.launching import sorting
 from wive.warp_kernels.launching.kernels import make_kernel
-from wive.warp_kernels.launching.launch import default_block_dim
+from wive.warp_kernels.launching.launch import MOST_CUDA_THREADS, default_block_dim
 
 ARCHITECTURES = (80, 90, 100)
 STACK = 96
 BLOCK = 256  # Warp's own
+BLOCK_REGISTERS = 64 * 1024  # on every CUDA device
 QUERIES = ("closest", "any", "count", "all")
 
 # Every query on one architecture, and on the others those two that hold nearly all there is to compile; exact
@@ -164,6 +165,7 @@ def test_kernel_compiles_for_cuda_within_its_limits(
     assert usage.spills == 0
     assert usage.stack <= stack_limit(query, accuracy, lanes)
     assert usage.registers <= REGISTERS[accuracy, lanes]
+    assert REGISTERS[accuracy, lanes] * MOST_CUDA_THREADS["float32"] <= BLOCK_REGISTERS
 
 
 @pytest.mark.timeout(120)
@@ -177,6 +179,7 @@ def test_kernel_for_compressed_nodes_compiles_within_its_limits(
     assert usage.spills == 0
     assert usage.stack <= stack_limit(query, accuracy, lanes)
     assert usage.registers <= COMPRESSED_REGISTERS[accuracy, lanes]
+    assert COMPRESSED_REGISTERS[accuracy, lanes] * MOST_CUDA_THREADS["float32"] <= BLOCK_REGISTERS
 
 
 @pytest.mark.timeout(120)
@@ -192,6 +195,7 @@ def test_kernel_for_float64_scenes_compiles_within_its_limits(
     assert usage.spills == 0
     assert usage.stack <= stack_limit(query, accuracy, lanes) + (DOUBLE_STACK_BYTES if lanes == 8 else 0)
     assert usage.registers <= DOUBLE_REGISTERS[accuracy, lanes]
+    assert DOUBLE_REGISTERS[accuracy, lanes] * MOST_CUDA_THREADS["float64"] <= BLOCK_REGISTERS
 
 
 @pytest.mark.timeout(120)

@@ -1,6 +1,5 @@
 """closest_hit and any_hit in users' own kernels, with Warp's default options, answer as the C++ core."""
 
-import dataclasses
 import subprocess
 import sys
 from pathlib import Path
@@ -89,43 +88,6 @@ def test_hits_counted_in_a_users_kernel_are_those_of_the_core(accuracy: str) -> 
     warp_kernels.check(tree)
     assert expected.max() > 5
     np.testing.assert_array_equal(counts.numpy(), expected)
-
-
-@pytest.mark.parametrize("other", ["fast", "exact"])
-def test_handle_of_the_wrong_accuracy_is_an_error_and_misses(other: str) -> None:
-    tree = warp_kernels.upload(_cpu.Bvh(*soup(100, 1), other), "cpu")
-    found = trace(trace_watertight, tree, random_rays(50, 2))
-    assert (found.prim == -1).all() and not found.occluded.any()
-    with pytest.raises(
-        warp_kernels.CorruptTreeError, match="given to a kernel that takes that of another accuracy"
-    ):
-        warp_kernels.check(tree)
-
-
-def test_handle_of_a_compressed_tree_is_an_error_and_misses() -> None:
-    tree = warp_kernels.upload(_cpu.Bvh(*soup(100, 1), nodes="compressed"), "cpu")
-    found = trace(trace_watertight, tree, random_rays(50, 2))
-    assert (found.prim == -1).all() and not found.occluded.any()
-    with pytest.raises(warp_kernels.CorruptTreeError, match="take trees with nodes 'float32'"):
-        warp_kernels.check(tree)
-
-
-def test_handle_of_a_float64_tree_is_an_error_and_misses() -> None:
-    vertices, faces = soup(100, 1)
-    tree = warp_kernels.upload(_cpu.Bvh(vertices.astype(np.float64), faces), "cpu")
-    found = trace(trace_watertight, tree, random_rays(50, 2))
-    assert (found.prim == -1).all() and not found.occluded.any()
-    with pytest.raises(warp_kernels.CorruptTreeError, match=r"float32 vertices.*astype\(np.float32\)"):
-        warp_kernels.check(tree)
-
-
-def test_tree_too_deep_for_the_functions_is_an_error_and_misses() -> None:
-    tree = warp_kernels.upload(_cpu.Bvh(*soup(100, 1)), "cpu")
-    tree.handle.stack = 129
-    found = trace(trace_watertight, dataclasses.replace(tree), random_rays(50, 2))
-    assert (found.prim == -1).all()
-    with pytest.raises(warp_kernels.CorruptTreeError, match="too deep for closest_hit"):
-        warp_kernels.check(tree)
 
 
 def test_functions_are_made_when_first_used(tmp_path: Path) -> None:

@@ -1,6 +1,6 @@
 """closest_hit, any_hit and count_hits for users' own kernels: one thread, one ray.
 
-Each has one overload per handle type, so the type of a kernel's argument chooses the accuracy.
+Each has one overload per handle type, so the type of a kernel's argument chooses accuracy and precision.
 """
 
 from typing import Any
@@ -9,70 +9,61 @@ import warp as wp
 
 from wive.warp_kernels.lanes.lanes import without_gradient
 from wive.warp_kernels.lanes.layout import NO_PRIM
+from wive.warp_kernels.lanes.precision import PRECISIONS
 from wive.warp_kernels.queries.frame import make_load_frame
 from wive.warp_kernels.queries.query_exact import query_of
 from wive.warp_kernels.traversal.traversal import make_traversal
-from wive.warp_kernels.tree.handle import ACCURACIES, HANDLES, STACK_TOO_SMALL, WRONG_ACCURACY, Hit
-
-# A tree of 2.7 million triangles needs less than 100; deeper trees are refused by the error flag.
-STACK_SIZE = 128
+from wive.warp_kernels.tree.handle import CORRUPTION, HANDLES, HITS, KINDS, REFUSAL, USERS_STACK
 
 
 @wp.func
-def _refused(error: wp.array(dtype=wp.int32), stack: int, accuracy: int, wanted: int, refusal: int):
-    """Whether the tree can't be traversed here; the error flag then says why."""
-    reason = int(0)
-    if stack > STACK_SIZE:
-        reason = STACK_TOO_SMALL
-    if accuracy != wanted:
-        reason = WRONG_ACCURACY
-    if refusal != 0:
-        reason = refusal
-    if reason != 0:
-        error[0] = reason
-    return reason != 0 or error[0] != 0
-
-
-@wp.func
-def _miss():
-    hit = Hit()
-    hit.t = wp.inf
-    hit.u = wp.nan
-    hit.v = wp.nan
-    hit.prim = NO_PRIM
-    return hit
+def _refused(error: wp.array(dtype=wp.int32), kind: int, wanted: int):
+    """Whether the tree can't be traversed here: it is of another kind, which is noted, or was overwritten."""
+    if kind != wanted:
+        error[REFUSAL] = 1
+    return kind != wanted or error[CORRUPTION] != 0
 
 
 def make_functions(
     accuracy: str,
+    precision: str,
     closest_hit: wp.Function | None = None,
     any_hit: wp.Function | None = None,
     count_hits: wp.Function | None = None,
 ) -> tuple[wp.Function, wp.Function, wp.Function]:
-    """The functions, with overloads for the handles of one more accuracy.
+    """The functions, with overloads for the handles of one more accuracy and precision.
 
     Warp looks up the function that an overload extends among the local variables here, so the arguments are
     the functions made before.
     """
-    handle_type, wanted = HANDLES[accuracy], ACCURACIES.index(accuracy)
-    closest, any_, count = (query_of(name, accuracy) for name in ("closest", "any", "count"))
-    load_frame = make_load_frame(accuracy, "float32")
+    handle_type, hit_type = HANDLES[accuracy, precision], HITS[precision]
+    wanted = KINDS.index((accuracy, precision))
+    real, vec3 = PRECISIONS[precision].real, PRECISIONS[precision].vec3
+    closest, any_, count = (query_of(name, accuracy, precision) for name in ("closest", "any", "count"))
+    load_frame = make_load_frame(accuracy, precision)
     begin_closest, distance = closest.begin, closest.distance
     begin_any, begin_count = any_.begin, count.begin
     trace_closest, trace_any, trace_count = (
-        make_traversal(name, accuracy, 8, STACK_SIZE, False) for name in ("closest", "any", "count")
+        make_traversal(name, accuracy, 8, USERS_STACK, False, precision=precision)
+        for name in ("closest", "any", "count")
     )
 
     @wp.func
-    def closest_hit(bvh: handle_type, origin: wp.vec3, direction: wp.vec3, tmin: float, tmax: float) -> Hit:
+    def closest_hit(bvh: handle_type, origin: vec3, direction: vec3, tmin: real, tmax: real) -> hit_type:
         """The closest hit in the closed interval [tmin, tmax], t in multiples of the direction's length.
 
         Bit for bit what `wive.Scene.intersect` returns. It takes the handle of a watertight tree (`Bvh`), of
-        a fast one (`FastBvh`) or of an exact one (`ExactBvh`). It has no gradient: `differentiable_hit` has.
+        a fast one (`FastBvh`) or of an exact one (`ExactBvh`); with those of float64 scenes (`Bvh64`,
+        `FastBvh64`) rays are vec3d and float64, and the hit is a `Hit64`. It has no gradient:
+        `differentiable_hit` has.
         """
-        hit = _miss()
+        hit = hit_type()
+        hit.t = real(wp.inf)
+        hit.u = real(wp.nan)
+        hit.v = real(wp.nan)
+        hit.prim = NO_PRIM
         ray = load_frame(bvh.center, origin, direction, tmin, tmax)
-        if ray.valid and not _refused(bvh.error, bvh.stack, bvh.accuracy, wanted, bvh.refusal):
+        if ray.valid and not _refused(bvh.error, bvh.kind, wanted):
             best = trace_closest(bvh, ray, 0, begin_closest(ray)).found
             if best.prim != NO_PRIM:
                 hit.t = distance(best, ray.unscale)
@@ -82,26 +73,26 @@ def make_functions(
         return hit
 
     @wp.func
-    def any_hit(bvh: handle_type, origin: wp.vec3, direction: wp.vec3, tmin: float, tmax: float) -> bool:
+    def any_hit(bvh: handle_type, origin: vec3, direction: vec3, tmin: real, tmax: real) -> bool:
         """Whether the ray hits anything within the closed interval [tmin, tmax], t as in `closest_hit`.
 
         It takes the same handles and has no gradient.
         """
         ray = load_frame(bvh.center, origin, direction, tmin, tmax)
         hit = bool(False)
-        if ray.valid and not _refused(bvh.error, bvh.stack, bvh.accuracy, wanted, bvh.refusal):
+        if ray.valid and not _refused(bvh.error, bvh.kind, wanted):
             hit = trace_any(bvh, ray, 0, begin_any(ray)).found.prim != NO_PRIM
         return hit
 
     @wp.func
-    def count_hits(bvh: handle_type, origin: wp.vec3, direction: wp.vec3, tmin: float, tmax: float) -> int:
+    def count_hits(bvh: handle_type, origin: vec3, direction: vec3, tmin: real, tmax: real) -> int:
         """The number of hits within the closed interval [tmin, tmax], as `wive.Scene.count`.
 
         It takes the same handles as `closest_hit` and has no gradient.
         """
         ray = load_frame(bvh.center, origin, direction, tmin, tmax)
         hits = int(0)
-        if ray.valid and not _refused(bvh.error, bvh.stack, bvh.accuracy, wanted, bvh.refusal):
+        if ray.valid and not _refused(bvh.error, bvh.kind, wanted):
             hits = trace_count(bvh, ray, 0, begin_count(ray)).found.count
         return hits
 
@@ -109,8 +100,8 @@ def make_functions(
 
 
 _functions: Any = ()
-for _accuracy in ACCURACIES:
-    _functions = make_functions(_accuracy, *_functions)
+for _kind in KINDS:
+    _functions = make_functions(*_kind, *_functions)
 # Which triangle is hit does not change smoothly with anything: no gradient passes through the traversal.
 for _function in _functions:
     for _overload in _function.user_overloads.values():

@@ -12,7 +12,9 @@ Code outside this folder is written once for both forms.
 
 import functools
 from types import SimpleNamespace
+from typing import Literal
 
+import numpy as np
 import warp as wp
 
 from wive.warp_kernels.lanes.native import (
@@ -24,12 +26,15 @@ from wive.warp_kernels.lanes.native import (
     OR_REDUCE,
     PRODUCT,
     PRODUCTS,
+    ROUNDED_AS_WRITTEN,
     ROW_1,
     ROW_8,
     SYNC,
     TRIANGLES_4,
     shared_stack_code,
 )
+
+Lanes = Literal[1, 8]
 
 
 @wp.func_native("""
@@ -87,6 +92,12 @@ def address_of(units: wp.array(dtype=wp.float32)) -> wp.uint64:
     ...
 
 
+@wp.func_native(ROUNDED_AS_WRITTEN)
+def rounded_as_written():
+    """Nothing: it compiles only if every operation is rounded as it is written."""
+    ...
+
+
 def without_gradient(function: wp.Function) -> wp.Function:
     """Keep Warp from building the function's adjoint, which functions with reference arguments can't have."""
     function.is_differentiable = False
@@ -120,9 +131,16 @@ def _nothing():
 def _sync_group(): ...
 
 
+def expected_lanes(lanes: object) -> Lanes:
+    """8 or 1; ValueError for all else."""
+    if isinstance(lanes, bool) or not isinstance(lanes, (int, np.integer)) or lanes not in (8, 1):
+        raise ValueError(f"lanes: expected 8 or 1, got {lanes!r}")
+    return 8 if lanes == 8 else 1
+
+
 def collectives(length: int) -> SimpleNamespace:
     """The or, minimum and sum over the threads of a ray, each returned to all of them, and their barrier."""
-    if length == 8:
+    if expected_lanes(length) == 8:
         return SimpleNamespace(or_reduce=_same, min_reduce=_same, sum_reduce=_same, sync=_nothing)
     return SimpleNamespace(
         or_reduce=_or_of_group, min_reduce=_min_of_group, sum_reduce=_sum_of_group, sync=_sync_group
@@ -136,7 +154,7 @@ def lanes_of(length: int, stack_words: int, precision: str) -> SimpleNamespace:
     length: lanes of a node per thread, 8 or 1. Vectors over a block's triangles have half as many lanes, at
     least one, and numbers of `precision`. stack_words: words that the stack has room for.
     """
-    eight = length == 8
+    eight = expected_lanes(length) == 8
     triangles_length = 4 if eight else 1
     rounded = "__fmul_rn" if precision == "float32" else "__dmul_rn"
     vector = wp.types.vector(length=length, dtype=wp.float32)

@@ -229,6 +229,13 @@ DOUBLE_TRIANGLES_4 = """
 #endif
 """
 
+# Refuses modules whose options let the compiler round otherwise: hits would not be the core's.
+ROUNDED_AS_WRITTEN = """
+#if (defined(__CUDA_FTZ) && __CUDA_FTZ) || defined(__FAST_MATH__)
+#error "wive: compile this kernel's module with fast_math=False: fast_math changes which triangles are hit"
+#endif
+"""
+
 # Products that no compiler may fuse with an addition, whatever options the module is compiled with: fused,
 # the two triangles at an edge would not compute the same numbers.
 PRODUCT = """

@@ -15,7 +15,7 @@ from wive.warp_kernels.queries.frame import FRAMES, box_tmax, make_load_frame
 from wive.warp_kernels.queries.query_exact import query_of
 from wive.warp_kernels.traversal.states import TRAVERSALS
 from wive.warp_kernels.traversal.traversal import make_traversal
-from wive.warp_kernels.tree.handle import HANDLES, HITS
+from wive.warp_kernels.tree.handle import CORRUPTION, HANDLES, HITS
 
 # Multiplications and additions stay apart: fused, the two triangles at an edge would not compute the same
 # numbers.
@@ -59,7 +59,7 @@ def make_kernel(
     """
     numbers, query_type = PRECISIONS[precision], query_of(query, accuracy, precision)
     real, vec3 = numbers.real, numbers.vec3
-    tree_type, frame_type = HANDLES[accuracy], FRAMES[precision]
+    tree_type, frame_type = HANDLES[accuracy, precision], FRAMES[precision]
     found_type, result_type = query_type.state, TRAVERSALS[query_type.state]
     traverse = make_traversal(query, accuracy, length, stack_size, counters, nodes, precision)
     or_reduce = collectives(length).or_reduce
@@ -82,7 +82,7 @@ def make_kernel(
         result = result_type()
         result.found = found
         # One answer for the ray's threads, which may see the flag change at different times.
-        if ray.valid and or_reduce(wp.uint32(tree.error[0])) == wp.uint32(0):
+        if ray.valid and or_reduce(wp.uint32(tree.error[CORRUPTION])) == wp.uint32(0):
             result = traverse(tree, ray, lane, found)
         return result
 

@@ -3,28 +3,30 @@ allocation: CUDA graphs can capture them."""
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Any
 
+import numpy as np
 import warp as wp
 
+from wive.warp_kernels.lanes.lanes import Lanes, expected_lanes
 from wive.warp_kernels.launching.kernels import make_kernel
 from wive.warp_kernels.launching.sorting import shift_counts, sort_kernel
 from wive.warp_kernels.tree.handle import HITS
 from wive.warp_kernels.tree.quiet import cpu_blocks, launch
 from wive.warp_kernels.tree.tree import Tree
 
-Lanes = Literal[1, 8]
-
 # Warp arrays hold no more.
 MOST_HITS = 2**31 - 1
 MOST_THREADS = 1024  # per block, on every CUDA device
+# A block has 64 Ki registers on every CUDA device: 128 per thread, or up to 168 in float64 trees.
+MOST_CUDA_THREADS = {"float32": 512, "float64": 384}
 # Static shared memory of a block is 48 KiB on every CUDA device; 1 KiB is for what triangle tests keep.
 SHARED_BYTES = 47 * 1024
 
 
 def default_block_dim(lanes: int) -> int:
     """Threads per block: with lanes=1, 64 keep the block's stacks within its 48 KiB of shared memory."""
-    return 64 if lanes == 1 else 128
+    return 64 if expected_lanes(lanes) == 1 else 128
 
 
 def launch_closest(
@@ -159,20 +161,29 @@ def launch_all(
         prim: (h,) int32.
         uv: (h,) vec2. In float64 trees t is float64 and uv vec2d.
     """
-    hits = wp.empty(len(t), dtype=HITS[tree.precision], device=tree.device)
+    block_dim = _expected_block_dim(tree, expected_lanes(lanes), block_dim)
+    query = "all_touching" if touching else "all"
     rays = (origins, directions, tmin, tmax)
-    _launch(
-        "all_touching" if touching else "all", tree, rays, (offsets, counts, hits), lanes, block_dim, stream
-    )
-    launch(
-        sort_kernel(tree.precision),
-        len(counts),
-        [offsets, counts, hits],
-        [t, prim, uv],
-        device=tree.device,
-        stream=stream,
-        record_tape=False,
-    )
+    # Hits are allocated and freed on the stream that writes them.
+    with wp.ScopedStream(stream, sync_enter=False):
+        _list_and_sort(query, tree, rays, (counts, offsets), (t, prim, uv), lanes, block_dim)
+
+
+def _list_and_sort(
+    query: str,
+    tree: Tree,
+    rays: tuple[wp.array[Any], ...],
+    places: tuple[wp.array[Any], ...],
+    outputs: tuple[wp.array[Any], ...],
+    lanes: Lanes,
+    block_dim: int | None,
+) -> None:
+    """List hits at the places given by counts and offsets, in any order, then sort them into the outputs."""
+    counts, offsets = places
+    hits = wp.empty(len(outputs[0]), dtype=HITS[tree.precision], device=tree.device)
+    _launch(query, tree, rays, (offsets, counts, hits), lanes, block_dim, None)
+    sort = sort_kernel(tree.precision)
+    launch(sort, len(counts), [offsets, counts, hits], list(outputs), device=tree.device, record_tape=False)
 
 
 def _launch(
@@ -187,16 +198,8 @@ def _launch(
     counters: bool = False,
 ) -> None:
     """Launch a query's kernel over rays: origins, directions, tmin, tmax; outputs not wanted are None."""
-    if lanes not in (1, 8):
-        raise ValueError(f"lanes: expected 8 or 1, got {lanes!r}")
-    if block_dim is None:
-        block_dim = default_block_dim(lanes)
-    if not 0 < block_dim <= MOST_THREADS:
-        raise ValueError(f"block_dim: expected 1 to {MOST_THREADS} threads, got {block_dim}")
-    if lanes == 1 and block_dim % 8 != 0:
-        raise ValueError(f"block_dim: expected a multiple of 8 with lanes=1, got {block_dim}")
-    if lanes == 1 and tree.device.is_cuda and block_dim // 8 * tree.stack * 8 > SHARED_BYTES:
-        raise ValueError(f"block_dim: {block_dim} threads have no room for their stacks in 48 KiB; use fewer")
+    lanes = expected_lanes(lanes)
+    block_dim = _expected_block_dim(tree, lanes, block_dim)
     if len(rays[0]) == 0:
         return
     kernel = make_kernel(query, tree.accuracy, lanes, tree.stack, counters, tree.nodes, tree.precision)
@@ -204,10 +207,33 @@ def _launch(
         launch(
             kernel,
             (len(rays[0]), 8 // lanes),
-            [tree.handle, *rays],
+            [tree.batch_handle, *rays],
             list(outputs),
             device=tree.device,
             stream=stream,
             block_dim=block_dim,
             record_tape=False,
         )
+
+
+def _expected_block_dim(tree: Tree, lanes: Lanes, block_dim: int | None) -> int:
+    """The threads per block; ValueError if they are no number that the kernel can be launched with."""
+    if block_dim is None:
+        return default_block_dim(lanes)
+    if isinstance(block_dim, bool) or not isinstance(block_dim, (int, np.integer)):
+        raise ValueError(f"block_dim: expected 1 to {MOST_THREADS} threads, got {block_dim!r}")
+    if not 0 < block_dim <= MOST_THREADS:
+        raise ValueError(f"block_dim: expected 1 to {MOST_THREADS} threads, got {block_dim}")
+    if lanes == 1 and block_dim % 8 != 0:
+        raise ValueError(f"block_dim: expected a multiple of 8 with lanes=1, got {block_dim}")
+    if tree.device.is_cuda:
+        if block_dim > MOST_CUDA_THREADS[tree.precision]:
+            raise ValueError(
+                f"block_dim: {block_dim} threads have no room in a block's registers; "
+                f"use at most {MOST_CUDA_THREADS[tree.precision]} in a {tree.precision} tree"
+            )
+        if lanes == 1 and block_dim // 8 * tree.stack * 8 > SHARED_BYTES:
+            raise ValueError(
+                f"block_dim: {block_dim} threads have no room for their stacks in 48 KiB; use fewer"
+            )
+    return int(block_dim)

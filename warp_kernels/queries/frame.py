@@ -7,6 +7,7 @@ import functools
 
 import warp as wp
 
+from wive.warp_kernels.lanes.lanes import rounded_as_written
 from wive.warp_kernels.lanes.layout import SIGN_BIT
 from wive.warp_kernels.lanes.precision import PRECISIONS
 from wive.warp_kernels.queries.limits import make_scale_limits, next_above
@@ -161,6 +162,7 @@ def make_load_frame(accuracy: str, precision: str) -> wp.Function:
     @wp.func
     def load_frame(center: wp.vec3, origin: vec3, direction: vec3, tmin: real, tmax: real):
         """The frame of a ray in a tree with this center."""
+        rounded_as_written()
         ray = frame_type()
         lengths = vec3(wp.abs(direction[0]), wp.abs(direction[1]), wp.abs(direction[2]))
         longest = wp.max(wp.max(lengths[0], lengths[1]), lengths[2])

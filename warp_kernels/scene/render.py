@@ -11,10 +11,11 @@ import numpy as np
 import warp as wp
 
 from wive._internal.picture import Image, Look
-from wive.warp_kernels import check, launch_any, launch_closest
+from wive.warp_kernels import launch_any, launch_closest
 from wive.warp_kernels.scene import shading as warp_shading
 from wive.warp_kernels.scene.tracer import WarpTracer, choose_lanes
 from wive.warp_kernels.tree.quiet import launch
+from wive.warp_kernels.tree.tree import check_memory
 
 # The tile and the wave of cpu/render/render.cpp: they say in which order a pixel's light is added up.
 TILE_WIDTH = 32
@@ -61,7 +62,7 @@ class PictureRenderer:
                     rays += self._paths.trace(frame, pixels, sums)
         mean = sums.numpy().reshape(-1, width, 3) * (np.float32(1) / np.float32(samples))
         self._image[begin:end] = mean
-        check(self._tracer.tree)
+        check_memory(self._tracer.tree)
         return rays
 
 

@@ -22,7 +22,6 @@ from wive.all_hits import AllHits, WrappedAllHits
 from wive.geoms import Geoms, one_geom
 from wive.hits import Hits, Stats, WrappedHits
 from wive.warp_kernels import (
-    check,
     launch_all,
     launch_any,
     launch_closest,
@@ -30,10 +29,12 @@ from wive.warp_kernels import (
     scan_counts,
     upload,
 )
+from wive.warp_kernels.lanes.lanes import expected_lanes
 from wive.warp_kernels.lanes.precision import PRECISIONS
 from wive.warp_kernels.scene.hits import WarpAllHits, WarpHits
 from wive.warp_kernels.scene.memory import expect_hits_fit, memory_errors
 from wive.warp_kernels.scene.rays import RayLoader, WarpRays
+from wive.warp_kernels.tree.tree import check_memory
 
 # For fewer rays eight threads per ray keep a GPU busy and return sooner; for more, one thread per ray traces
 # more rays per second. The two are equal at this size on an H200, docs/warp.md.
@@ -43,7 +44,8 @@ EIGHT_THREADS_BELOW = 32_768
 def choose_lanes(lanes: Lanes | None, count: int, on_cuda: bool) -> Lanes:
     """Lanes of a node per thread; None is the better choice for a batch of `count` rays."""
     if lanes is not None:
-        return lanes
+        chosen: Lanes = expected_lanes(lanes)
+        return chosen
     return 1 if on_cuda and count < EIGHT_THREADS_BELOW else 8
 
 
@@ -56,15 +58,14 @@ class WarpTracer:
     def __init__(
         self, bvh: _cpu.Bvh, faces: NDArray[np.int32], device: str, geoms: Geoms | None = None
     ) -> None:
-        """Copy the tree to the device, and wait until it is there: queries may use any stream."""
+        """Copy the tree to the device; `upload` waits until it is there, since queries may use any stream."""
         self.bvh, self.device, self.geoms = bvh, device, geoms
         self.vertices, self.faces = bvh.vertices, faces
         self.accuracy, self.precision = bvh.accuracy, bvh.precision
-        with memory_errors():
-            self.tree = upload(bvh, device)
-        self.loader = RayLoader(device, real_of(bvh.vertices.dtype, bvh.accuracy))
         self._numbers = PRECISIONS[bvh.precision]
-        wp.synchronize_stream(device)
+        with memory_errors():
+            self.loader = RayLoader(device, real_of(bvh.vertices.dtype, bvh.accuracy))
+            self.tree = upload(bvh, device)
 
     @functools.cached_property
     def mesh(self) -> tuple[Any, Any]:
@@ -113,7 +114,7 @@ class WarpTracer:
             lanes = self._lanes(work, loaded)
             launch_closest(self.tree, *_arrays(loaded), t, prim, uv, stats=steps, lanes=lanes)
             if rays.library is NUMPY:
-                check(self.tree)
+                check_memory(self.tree)
                 found = t.numpy() if near is None else near.t(t.numpy())
                 arrays = found, prim.numpy(), uv.numpy(), self.vertices, self.faces
                 return Hits(*arrays, rays, self.accuracy, near, self.geoms), _numpy_stats(steps)
@@ -157,7 +158,7 @@ class WarpTracer:
                 lanes=lanes,
             )
             if rays.library is NUMPY:
-                check(self.tree)
+                check_memory(self.tree)
                 arrays = offsets.numpy(), t.numpy(), prim.numpy(), uv.numpy()
                 mesh = self.vertices, self.faces, self.geoms
                 every = AllHits(*arrays, *mesh)
@@ -195,7 +196,7 @@ class WarpTracer:
 
     def _returned(self, output: Any, steps: Any, rays: Rays) -> tuple[Any, Stats | None]:
         if rays.library is NUMPY:
-            check(self.tree)
+            check_memory(self.tree)
             return output.numpy(), _numpy_stats(steps)
         return rays.library.from_warp(output), _stats(steps, rays)
 

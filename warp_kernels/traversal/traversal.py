@@ -19,7 +19,7 @@ from wive.warp_kernels.traversal.nearest import keep_nearest_double, sortable, u
 from wive.warp_kernels.traversal.slabs import make_visit
 from wive.warp_kernels.traversal.states import TRAVERSALS
 from wive.warp_kernels.tree.blocks import block_form
-from wive.warp_kernels.tree.handle import CORRUPT, HANDLES
+from wive.warp_kernels.tree.handle import CORRUPTION, HANDLES
 from wive.warp_kernels.tree.nodes import NODES
 from wive.warp_kernels.triangles import (
     triangle_exact,
@@ -74,7 +74,8 @@ def make_traversal(
     count_triangles = make_count(blocks)
     node_words: int = node.words
     block_words: int = blocks.least_words
-    tree_type, found_type, result_type = HANDLES[accuracy], query_type.state, TRAVERSALS[query_type.state]
+    tree_type, found_type = HANDLES[accuracy, precision], query_type.state
+    result_type = TRAVERSALS[found_type]
     # Hits of a ray's threads whose t round to the same float32 number are compared once more at the end.
     compares: bool = in_order and length == 1 and (accuracy == "exact" or precision == "float64")
     keep_nearest: Any = None
@@ -111,7 +112,7 @@ def make_traversal(
             end = wp.uint32(begin) + wp.uint32(wp.where(inner, node_words, block_count * block_words))
             steps += 1
             if steps > tree.step_limit or top > wp.static(stack_size - NODE_WIDTH) or end > words:
-                tree.error[0] = CORRUPT
+                tree.error[CORRUPTION] = 1
                 break
             if inner:
                 top += visit(units, begin, lane, ray, result.tmax, stack, top) - 1

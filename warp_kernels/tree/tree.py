@@ -20,29 +20,12 @@ from wive.warp_kernels.lanes.layout import (
     UNIT_WORDS,
     WORD_MASK,
 )
-from wive.warp_kernels.tree.handle import (
-    ACCURACIES,
-    COMPRESSED,
-    CORRUPT,
-    FLOAT64,
-    HANDLES,
-    STACK_TOO_SMALL,
-    WRONG_ACCURACY,
-)
-from wive.warp_kernels.tree.quiet import set_quiet
+from wive.warp_kernels.tree.handle import CORRUPTION, HANDLES, KINDS, REFUSAL, USERS_STACK
+from wive.warp_kernels.tree.quiet import launch, quiet
 from wive.warp_kernels.tree.ranks import INVERT_ORDERS
 
 # Kernels are compiled for the smallest of these sizes that the tree can't overflow.
 STACK_SIZES = (32, 64, 96, 128, 256, 512)
-
-_REASONS = {
-    CORRUPT: "a traversal left the tree or did not end: the tree's memory was overwritten",
-    STACK_TOO_SMALL: "the tree is too deep for closest_hit and any_hit; use launch_closest and launch_any",
-    WRONG_ACCURACY: "the handle of a tree was given to a kernel that takes that of another accuracy",
-    COMPRESSED: "closest_hit and any_hit take trees with nodes 'float32'; use launch_closest and launch_any",
-    FLOAT64: "closest_hit and any_hit take trees of float32 vertices; use launch_closest and launch_any, "
-    "or make the scene with vertices.astype(np.float32)",
-}
 
 
 class CorruptTreeError(RuntimeError):
@@ -53,19 +36,37 @@ class CorruptTreeError(RuntimeError):
 class Tree:
     """A tree on a Warp device, made by `upload`.
 
-    `handle` is what kernels take: a `Bvh`, `FastBvh` or `ExactBvh`, depending on the accuracy. `stack` is the
-    stack size that its kernels are compiled for, `nodes` is "float32" or "compressed", `precision` "float32"
-    or "float64".
+    `batch_handle` is what `launch_closest` and its kin pass to their kernels, `stack` the stack size that
+    these are compiled for, `nodes` "float32" or "compressed", `precision` "float32" or "float64".
     """
 
     device: wp.Device
     accuracy: str
-    handle: Any
+    batch_handle: Any
     units: wp.array[Any]
     error: wp.array[Any]
     stack: int
     nodes: str = "float32"
     precision: str = "float32"
+
+    @property
+    def handle(self) -> Any:
+        """What users' own kernels take: the struct in `HANDLES` of this accuracy and precision.
+
+        Raises ValueError if `closest_hit`, `any_hit` and `count_hits` can't traverse the tree.
+        """
+        batches = "use launch_closest, launch_any and launch_count over batches of rays"
+        if self.nodes != "float32":
+            raise ValueError(
+                f"kernels of your own take trees with nodes 'float32', this one has {self.nodes!r}: "
+                f"make the scene with nodes='float32', or {batches}"
+            )
+        if self.batch_handle.stack > USERS_STACK:
+            raise ValueError(
+                f"kernels of your own have room for {USERS_STACK} nodes on their stack, this tree is so deep "
+                f"that it needs {self.batch_handle.stack}: {batches}"
+            )
+        return self.batch_handle
 
     @property
     def memory(self) -> int:
@@ -76,25 +77,21 @@ class Tree:
 def upload(bvh: _cpu.Bvh, device: wp.DeviceLike = None) -> Tree:
     """Copy the tree to a Warp device ("cpu", "cuda:0", ...; None is Warp's current device).
 
-    The copy differs in one row of each node: `order`, which says which child comes i-th, is turned into the
-    rank of each child, so that a lane finds its place without reading another lane.
+    Waits until it is there, so that kernels on any stream may use it. The copy differs in one row of each
+    node: `order`, which says which child comes i-th, is turned into the rank of each child, so that a lane
+    finds its place without reading another lane.
     """
-    set_quiet()
+    with quiet():
+        wp.init()
     place = wp.get_device(device)
     nodes = bvh.nodes
     units: wp.array[Any] = wp.array(bvh.units.reshape(-1).view(np.float32), dtype=wp.float32, device=place)
-    error = wp.zeros(1, dtype=wp.int32, device=place)
+    error = wp.zeros(2, dtype=wp.int32, device=place)
     needed = stack_size(nodes)
-    wp.launch(
-        INVERT_ORDERS[bvh.node_form],
-        dim=len(nodes),
-        inputs=[units],
-        device=place,
-        block_dim=128,
-        record_tape=False,
-    )
+    invert = INVERT_ORDERS[bvh.node_form]
+    launch(invert, len(nodes), [units], [], device=place, block_dim=128, record_tape=False)
 
-    handle = HANDLES[bvh.accuracy]()
+    handle = HANDLES[bvh.accuracy, bvh.precision]()
     handle.units = units
     handle.error = error
     handle.center = wp.vec3(*bvh.center.tolist())
@@ -104,26 +101,42 @@ def upload(bvh: _cpu.Bvh, device: wp.DeviceLike = None) -> Tree:
     block_words = 2 * BLOCK_WORDS if double else LEAST_COMPRESSED_WORDS if compressed else BLOCK_WORDS
     handle.step_limit = len(bvh.units) // (min(node_words, block_words) // UNIT_WORDS) + 1
     handle.stack = needed
-    handle.accuracy = ACCURACIES.index(bvh.accuracy)
-    handle.refusal = FLOAT64 if double else COMPRESSED if compressed else 0
-    stack = next(size for size in STACK_SIZES if size >= needed)
+    handle.kind = KINDS.index((bvh.accuracy, bvh.precision))
+    wp.synchronize_stream(place)
     return Tree(
         device=place,
         accuracy=bvh.accuracy,
-        handle=handle,
+        batch_handle=handle,
         units=units,
         error=error,
-        stack=stack,
+        stack=next(size for size in STACK_SIZES if size >= needed),
         nodes=bvh.node_form,
         precision=bvh.precision,
     )
 
 
 def check(tree: Tree) -> None:
-    """Wait for the device and raise CorruptTreeError if a kernel could not traverse the tree."""
-    reason = int(tree.error.numpy()[0])
-    if reason:
-        raise CorruptTreeError(f"tree on {tree.device}: {_REASONS[reason]}")
+    """Wait for the device; raise CorruptTreeError if a kernel could not traverse the tree.
+
+    A kernel that took the handle for that of another tree is reported once and leaves the tree as it was.
+    """
+    check_memory(tree)
+    if tree.error.numpy()[REFUSAL]:
+        tree.error[REFUSAL : REFUSAL + 1].zero_()
+        raise CorruptTreeError(
+            f"tree on {tree.device}: a kernel that takes the handle of another kind of tree was given this "
+            "one's and found nothing: annotate its argument as "
+            f"wive.warp_kernels.{HANDLES[tree.accuracy, tree.precision].key}"
+        )
+
+
+def check_memory(tree: Tree) -> None:
+    """Wait for the device; raise CorruptTreeError if a kernel found the tree overwritten."""
+    if tree.error.numpy()[CORRUPTION]:
+        raise CorruptTreeError(
+            f"tree on {tree.device}: a traversal left the tree or did not end: "
+            "the tree's memory was overwritten"
+        )
 
 
 def stack_size(nodes: NDArray[np.uint32]) -> int:

@@ -152,9 +152,10 @@ class TorchTensors:
             return contextlib.nullcontext()
         import warp as wp
 
-        current = sys.modules["torch"].cuda.current_stream(device)
+        current = wp.stream_from_torch(sys.modules["torch"].cuda.current_stream(device))
+        # Warp frees memory on its own stream, which has to go on behind this one. Graphs can't capture that.
         stream: contextlib.AbstractContextManager[Any] = wp.ScopedStream(
-            wp.stream_from_torch(current), sync_enter=False
+            current, sync_enter=False, sync_exit=not current.is_capturing
         )
         return stream
 

@@ -70,11 +70,10 @@ def _start_warp() -> ModuleType:
     """Warp, started without messages about itself; `warp_devices` reports a missing driver."""
     import tempfile
 
-    from wive.warp_kernels.tree.quiet import set_quiet
+    from wive.warp_kernels.tree.quiet import quiet
 
     wp = importlib.import_module("warp")
-    set_quiet()
-    with tempfile.TemporaryFile() as messages, _stderr_to(messages.fileno()):
+    with tempfile.TemporaryFile() as messages, quiet(), _stderr_to(messages.fileno()):
         wp.init()
         messages.seek(0)
         said = messages.read().decode(errors="replace").splitlines(keepends=True)

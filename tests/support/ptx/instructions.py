@@ -48,6 +48,7 @@ RULES = {
     "not": Rule("~{a}"),
     "or": Rule("{a} | {b}"),
     "popc": Rule("__builtin_popcountll({a})", result="u32"),
+    "prmt": Rule("permuted_bytes({a}, {b}, {c})"),
     "rcp.rn": Rule("1 / {a}"),
     "redux.sync.add": Rule("meet(Operation::sum, {site}, {b}, {a})", ("u32", "u32")),
     "redux.sync.min": Rule("meet(Operation::minimum, {site}, {b}, {a})", ("u32", "u32")),

@@ -132,6 +132,18 @@ T insert_bits(T source, T target, std::uint32_t first, std::uint32_t count) {
     return static_cast<T>((target & ~mask) | (shift_left(source, first) & mask));
 }
 
+// Four of the eight bytes of b:a; bit 3 of a choice copies the byte's sign instead.
+inline std::uint32_t permuted_bytes(std::uint32_t a, std::uint32_t b, std::uint32_t choices) {
+    const std::uint64_t bytes = std::uint64_t(b) << 32 | a;
+    std::uint32_t permuted = 0;
+    for (int i = 0; i < 4; ++i) {
+        const std::uint32_t choice = choices >> 4 * i & 15u;
+        const std::uint32_t byte = static_cast<std::uint32_t>(bytes >> 8 * (choice & 7u)) & 255u;
+        permuted |= (choice < 8 ? byte : byte >> 7 ? 255u : 0u) << 8 * i;
+    }
+    return permuted;
+}
+
 inline std::uint32_t leading_zeros(std::uint32_t x) { return x == 0 ? 32 : __builtin_clz(x); }
 
 // Places that would shift the highest bit set to the top; all ones if there is none.
