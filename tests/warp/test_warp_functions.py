@@ -1,5 +1,6 @@
 """closest_hit and any_hit in users' own kernels, with Warp's default options, answer as the C++ core."""
 
+import functools
 import subprocess
 import sys
 from pathlib import Path
@@ -10,84 +11,67 @@ import pytest
 wp = pytest.importorskip("warp")
 
 from support.meshes import random_rays, soup
-from support.warp_launches import INFINITE, ZERO, Answers, assert_bit_identical, cpu_answers
 
 from wive import _cpu, warp_kernels
+from wive.warp_kernels.lanes.precision import PRECISIONS
+from wive.warp_kernels.tree.handle import HANDLES, HITS
 
 pytestmark = pytest.mark.timeout(120)
 
 
-HANDLES = {"watertight": warp_kernels.Bvh, "fast": warp_kernels.FastBvh, "exact": warp_kernels.ExactBvh}
+@functools.cache
+def kernel_for(accuracy: str, precision: str) -> wp.Kernel:
+    """A user's kernel that takes the handle of trees of this accuracy and precision."""
+    numbers = PRECISIONS[precision]
+    real, vec3 = numbers.real, numbers.vec3
 
-
-def make_kernels(handle: type) -> tuple[wp.Kernel, wp.Kernel]:
-    """A user's kernels for one type of handle."""
-
-    @wp.kernel(module="unique")
+    @wp.kernel(module="unique", enable_backward=False)
     def trace(
-        bvh: handle,
-        origins: wp.array(dtype=wp.vec3),
-        directions: wp.array(dtype=wp.vec3),
-        hits: wp.array(dtype=warp_kernels.Hit),
+        bvh: HANDLES[accuracy, precision],
+        origins: wp.array(dtype=vec3),
+        directions: wp.array(dtype=vec3),
+        hits: wp.array(dtype=HITS[precision]),
         occluded: wp.array(dtype=wp.bool),
-    ):
-        i = wp.tid()
-        hits[i] = warp_kernels.closest_hit(bvh, origins[i], directions[i], 0.0, wp.inf)
-        occluded[i] = warp_kernels.any_hit(bvh, origins[i], directions[i], 0.0, wp.inf)
-
-    @wp.kernel(module="unique")
-    def count(
-        bvh: handle,
-        origins: wp.array(dtype=wp.vec3),
-        directions: wp.array(dtype=wp.vec3),
         counts: wp.array(dtype=wp.int32),
     ):
         i = wp.tid()
-        counts[i] = warp_kernels.count_hits(bvh, origins[i], directions[i], 0.25, 1.5)
+        origin, direction = origins[i], directions[i]
+        hits[i] = warp_kernels.closest_hit(bvh, origin, direction, real(0.0), real(wp.inf))
+        occluded[i] = warp_kernels.any_hit(bvh, origin, direction, real(0.0), real(0.03))
+        counts[i] = warp_kernels.count_hits(bvh, origin, direction, real(0.25), real(1.5))
 
-    return trace, count
-
-
-KERNELS = {accuracy: make_kernels(handle) for accuracy, handle in HANDLES.items()}
-trace_watertight, _ = KERNELS["watertight"]
-
-
-def trace(kernel: wp.Kernel, tree: warp_kernels.Tree, rays: tuple[np.ndarray, np.ndarray]) -> Answers:
-    origins, directions = (wp.array(a, dtype=wp.vec3, device="cpu") for a in rays)
-    hits = wp.zeros(len(origins), dtype=warp_kernels.Hit, device="cpu")
-    occluded = wp.zeros(len(origins), dtype=wp.bool, device="cpu")
-    wp.launch(kernel, len(origins), inputs=[tree.handle, origins, directions, hits, occluded], device="cpu")
-    found = hits.numpy()
-    uv = np.stack([found["u"], found["v"]], axis=1)
-    none = np.zeros((len(found), 3), np.int32)
-    return Answers(found["t"], found["prim"], uv, occluded.numpy(), *[none] * 8)
+    return trace
 
 
-@pytest.mark.parametrize("accuracy", KERNELS)
-def test_functions_in_a_users_kernel_give_the_bits_of_the_core(accuracy: str) -> None:
-    bvh = _cpu.Bvh(*soup(3000, 1), accuracy)
-    rays = random_rays(2000, 2, 0.0, 1.0)
-    rays[1][::100] = 0
+@pytest.mark.parametrize(("accuracy", "precision"), HANDLES)
+def test_functions_in_a_users_kernel_give_the_bits_of_the_core(accuracy: str, precision: str) -> None:
+    vertices, faces = soup(3000, 1)
+    bvh = _cpu.Bvh(vertices.astype(precision), faces, accuracy)
+    origins, directions = (rows.astype(precision) for rows in random_rays(2000, 2, 0.0, 1.0))
+    origins[1::3] += 1e-9  # nothing that float32 holds
+    directions[::100] = 0
     tree = warp_kernels.upload(bvh, "cpu")
-    found = trace(KERNELS[accuracy][0], tree, rays)
+    vec3 = PRECISIONS[precision].vec3
+    rays = [wp.array(rows, dtype=vec3, device="cpu") for rows in (origins, directions)]
+    outputs = [wp.zeros(2000, dtype=dtype, device="cpu") for dtype in (HITS[precision], wp.bool, wp.int32)]
+    wp.launch(kernel_for(accuracy, precision), 2000, [tree.handle, *rays], outputs, device="cpu")
     warp_kernels.check(tree)
-    assert_bit_identical(
-        found, cpu_answers(bvh, "scalar", *rays, ZERO, INFINITE), ("t", "prim", "uv", "occluded")
-    )
+    hits, occluded, counts = (array.numpy() for array in outputs)
 
+    def limits(*values: float) -> list[np.ndarray]:
+        return [np.array([value], precision) for value in values]
 
-@pytest.mark.parametrize("accuracy", KERNELS)
-def test_hits_counted_in_a_users_kernel_are_those_of_the_core(accuracy: str) -> None:
-    bvh = _cpu.Bvh(*soup(3000, 1), accuracy)
-    rays = random_rays(2000, 2, 0.0, 1.0)
-    expected, _ = bvh.count("scalar", *rays, np.float32([0.25]), np.float32([1.5]))
-    tree = warp_kernels.upload(bvh, "cpu")
-    counts = wp.zeros(2000, dtype=wp.int32, device="cpu")
-    vectors = [wp.array(a, dtype=wp.vec3, device="cpu") for a in rays]
-    wp.launch(KERNELS[accuracy][1], 2000, inputs=[tree.handle, *vectors, counts], device="cpu")
-    warp_kernels.check(tree)
+    t, prim, uv, _ = bvh.intersect("scalar", origins, directions, *limits(0, np.inf))
+    assert len(np.unique(prim)) > 500
+    np.testing.assert_array_equal(hits["t"], t)
+    np.testing.assert_array_equal(hits["prim"], prim)
+    np.testing.assert_array_equal(np.stack([hits["u"], hits["v"]], axis=1), uv)
+    expected, _ = bvh.occluded("scalar", origins, directions, *limits(0, 0.03))
+    assert 0.2 < expected.mean() < 0.9
+    np.testing.assert_array_equal(occluded, expected)
+    expected, _ = bvh.count("scalar", origins, directions, *limits(0.25, 1.5))
     assert expected.max() > 5
-    np.testing.assert_array_equal(counts.numpy(), expected)
+    np.testing.assert_array_equal(counts, expected)
 
 
 def test_functions_are_made_when_first_used(tmp_path: Path) -> None:

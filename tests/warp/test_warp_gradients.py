@@ -1,5 +1,7 @@
 """Gradients of a hit with respect to the ray and the vertices, against finite differences."""
 
+import functools
+
 import numpy as np
 import pytest
 
@@ -8,34 +10,39 @@ wp = pytest.importorskip("warp")
 from support.meshes import sphere
 
 from wive import _cpu, warp_kernels
+from wive.warp_kernels.lanes.precision import PRECISIONS
+from wive.warp_kernels.tree.handle import HANDLES
 
 pytestmark = pytest.mark.timeout(120)
 
 
-def weighing_kernel(handle: type) -> wp.Kernel:
-    """A kernel whose loss depends on t and the point, for one type of handle."""
+@functools.cache
+def weighing_kernel(accuracy: str, precision: str) -> wp.Kernel:
+    """A kernel whose loss depends on t and the point, for one kind of tree."""
+    real, vec3 = PRECISIONS[precision].real, PRECISIONS[precision].vec3
 
     @wp.kernel(module="unique")
     def weigh(
-        bvh: handle,
-        vertices: wp.array(dtype=wp.vec3),
+        bvh: HANDLES[accuracy, precision],
+        vertices: wp.array(dtype=vec3),
         faces: wp.array(dtype=wp.vec3i),
-        origins: wp.array(dtype=wp.vec3),
-        directions: wp.array(dtype=wp.vec3),
-        loss: wp.array(dtype=wp.float32),
+        origins: wp.array(dtype=vec3),
+        directions: wp.array(dtype=vec3),
+        loss: wp.array(dtype=real),
     ):
         i = wp.tid()
-        hit = warp_kernels.differentiable_hit(bvh, vertices, faces, origins[i], directions[i], 0.0, wp.inf)
+        origin, direction = origins[i], directions[i]
+        hit = warp_kernels.differentiable_hit(
+            bvh, vertices, faces, origin, direction, real(0.0), real(wp.inf)
+        )
         if hit.prim >= 0:
-            loss[i] = hit.t + wp.dot(wp.vec3(0.5, -1.0, 2.0), hit.point)
+            loss[i] = hit.t + wp.dot(vec3(real(0.5), real(-1.0), real(2.0)), hit.point)
 
     return weigh
 
 
-KERNELS = {
-    "watertight": weighing_kernel(warp_kernels.Bvh),
-    "fast": weighing_kernel(warp_kernels.FastBvh),
-}
+# Accuracy and precision, and how far gradients may be off.
+KINDS = [("watertight", "float32", 1e-3), ("fast", "float32", 1e-3), ("watertight", "float64", 1e-7)]
 
 
 def exact_loss(triangle: np.ndarray, origin: np.ndarray, direction: np.ndarray) -> float:
@@ -59,37 +66,37 @@ def slopes(triangle: np.ndarray, origin: np.ndarray, direction: np.ndarray, whic
     return result
 
 
-@pytest.mark.parametrize("accuracy", KERNELS)
-def test_gradients_of_distance_and_point_are_those_of_finite_differences(accuracy: str) -> None:
+@pytest.mark.parametrize(("accuracy", "precision", "tolerance"), KINDS)
+def test_gradients_of_distance_and_point_are_those_of_finite_differences(
+    accuracy: str, precision: str, tolerance: float
+) -> None:
     vertices, faces = sphere(1)
+    vertices = vertices.astype(precision)
+    numbers = PRECISIONS[precision]
     random = np.random.default_rng(5)
     toward = random.standard_normal((12, 3))
-    origins = (3 * toward / np.linalg.norm(toward, axis=1, keepdims=True)).astype(np.float32)
-    directions = (0.3 * random.standard_normal((12, 3)) - origins).astype(np.float32)
+    origins = (3 * toward / np.linalg.norm(toward, axis=1, keepdims=True)).astype(precision)
+    directions = (0.3 * random.standard_normal((12, 3)) - origins).astype(precision)
     origins[0], directions[0] = (5, 5, 5), (1, 1, 1)  # misses: no gradient at all
 
     tree = warp_kernels.upload(_cpu.Bvh(vertices, faces, accuracy), "cpu")
     arrays = [
-        wp.array(vertices, dtype=wp.vec3, device="cpu", requires_grad=True),
+        wp.array(vertices, dtype=numbers.vec3, device="cpu", requires_grad=True),
         wp.array(faces, dtype=wp.vec3i, device="cpu"),
-        wp.array(origins, dtype=wp.vec3, device="cpu", requires_grad=True),
-        wp.array(directions, dtype=wp.vec3, device="cpu", requires_grad=True),
+        wp.array(origins, dtype=numbers.vec3, device="cpu", requires_grad=True),
+        wp.array(directions, dtype=numbers.vec3, device="cpu", requires_grad=True),
     ]
-    loss = wp.zeros(len(origins), dtype=wp.float32, device="cpu", requires_grad=True)
+    loss = wp.zeros(len(origins), dtype=numbers.real, device="cpu", requires_grad=True)
     with wp.Tape() as tape:
-        wp.launch(
-            KERNELS[accuracy], len(origins), inputs=[tree.handle, *arrays], outputs=[loss], device="cpu"
-        )
+        kernel = weighing_kernel(accuracy, precision)
+        wp.launch(kernel, len(origins), inputs=[tree.handle, *arrays], outputs=[loss], device="cpu")
     tape.backward(grads={loss: wp.ones_like(loss)})
     warp_kernels.check(tree)
     got = [tape.gradients[arrays[i]].numpy() for i in (0, 2, 3)]
 
     wanted = [np.zeros((len(vertices), 3)), np.zeros_like(got[1]), np.zeros_like(got[2])]
-    infinite = np.full(1, np.inf, np.float32)
-    hits = _cpu.Bvh(vertices, faces, accuracy).intersect(
-        "scalar", origins, directions, np.zeros(1, np.float32), infinite
-    )
-    prim = hits[1]
+    limits = np.zeros(1, precision), np.full(1, np.inf, precision)
+    prim = _cpu.Bvh(vertices, faces, accuracy).intersect("scalar", origins, directions, *limits)[1]
     assert (prim >= 0).sum() >= 8
     for i in np.flatnonzero(prim >= 0):
         corners = faces[prim[i]]
@@ -101,5 +108,5 @@ def test_gradients_of_distance_and_point_are_those_of_finite_differences(accurac
         np.add.at(wanted[0], corners, slopes(*one, 0))
         wanted[1][i], wanted[2][i] = slopes(*one, 1), slopes(*one, 2)
     for mine, exact in zip(got, wanted, strict=True):
-        np.testing.assert_allclose(mine, exact, rtol=1e-3, atol=1e-3)
+        np.testing.assert_allclose(mine, exact, rtol=tolerance, atol=tolerance)
     assert not got[1][0].any()
