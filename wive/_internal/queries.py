@@ -62,7 +62,7 @@ class Queries:
                 may have any length. Warp, torch and DLPack arrays give hits in arrays of their library, on
                 their device, without passing through the host; for a Warp scene they must lie on its device
                 and have its dtype. No call waits for the GPU then: with Warp's memory pools, CUDA graphs can
-                capture it.
+                capture it. Hits carry no gradient to torch's tensors; those of `wive.torch.intersect` do.
             tmin, tmax: a number, or one per ray, (n,) or of the rays' leading shape, in multiples of the
                 direction's length.
             threads: how many to use; None is every core. For CPU backends.
