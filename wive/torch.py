@@ -59,7 +59,7 @@ def intersect(
             None takes the scene's own. Rays meet the planes that these give, so they should be those that the
             scene was made of or refitted to.
 
-    Raises ValueError or TypeError as `Scene.intersect`, and if `vertices` does not fit the scene and the rays.
+    Raises ValueError or TypeError as `Scene.intersect`, and if `vertices` does not fit the scene and rays.
     """
     limits = (limit.detach() if isinstance(limit, torch.Tensor) else limit for limit in (tmin, tmax))
     options: dict[str, Any] = {"threads": threads, "in_flight": in_flight, "lanes": lanes}

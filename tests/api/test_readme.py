@@ -44,7 +44,10 @@ def test_the_libraries_pages_programs_print_what_they_say(program: str, tmp_path
 
 @pytest.mark.parametrize("number", range(len(programs("docs/warp.md"))))
 def test_the_warp_pages_programs_run(number: int, tmp_path: Path, device: str) -> None:
-    assert run(programs("docs/warp.md")[number], tmp_path) != ""
+    program = programs("docs/warp.md")[number]
+    if "import torch" in program:
+        pytest.importorskip("torch")
+    assert run(program, tmp_path) != ""
 
 
 PAGES = "docs/pictures.md", "docs/sensors.md", "docs/several_meshes.md", "docs/terrain.md"
