@@ -93,6 +93,38 @@ def test_cuda_code_gives_the_bits_of_the_core(
         assert_bit_identical(dataclasses.replace(core, **found), core, list(found))
 
 
+@wp.kernel(module="unique", enable_backward=False)
+def of_a_user(
+    bvh: warp_kernels.Bvh,
+    origins: wp.array(dtype=wp.vec3),
+    directions: wp.array(dtype=wp.vec3),
+    t: wp.array(dtype=wp.float32),
+    prim: wp.array(dtype=wp.int32),
+    uv: wp.array(dtype=wp.vec2),
+):
+    i = wp.tid()
+    hit = warp_kernels.closest_hit(bvh, origins[i], directions[i], -wp.inf, wp.inf)
+    t[i] = hit.t
+    prim[i] = hit.prim
+    uv[i] = wp.vec2(hit.u, hit.v)
+
+
+def test_cuda_code_of_a_users_kernel_gives_the_bits_of_the_core() -> None:
+    """With Warp's default options: products and sums of the module may be fused."""
+    for mesh in MESHES:
+        bvh = core_tree(mesh, "watertight", "float32", "float32")
+        rays = rays_of(bvh, mesh)
+        given = [wp.array(rows, dtype=wp.vec3, device="cpu") for rows in rays]
+        dtypes = {"t": wp.float32, "prim": wp.int32, "uv": wp.vec2}
+        outputs = [wp.zeros(len(rays[0]), dtype=dtype, device="cpu") for dtype in dtypes.values()]
+        tree = warp_kernels.upload(bvh, "cpu")
+        with on_the_host():
+            wp.launch(of_a_user, len(rays[0]), [tree.handle, *given], outputs, device="cpu")
+        core = cpu_answers(bvh, "scalar", *rays, BEHIND, INFINITE)
+        found = {name: array.numpy() for name, array in zip(dtypes, outputs, strict=True)}
+        assert_bit_identical(dataclasses.replace(core, **found), core, list(found))
+
+
 FORMS = [
     form
     for form in itertools.product(

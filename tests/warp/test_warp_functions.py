@@ -13,6 +13,7 @@ wp = pytest.importorskip("warp")
 from support.meshes import random_rays, soup
 
 from wive import _cpu, warp_kernels
+from wive.hits import surface_normals
 from wive.warp_kernels.lanes.precision import PRECISIONS
 from wive.warp_kernels.tree.handle import HANDLES, HITS
 
@@ -66,6 +67,15 @@ def test_functions_in_a_users_kernel_give_the_bits_of_the_core(accuracy: str, pr
     np.testing.assert_array_equal(hits["t"], t)
     np.testing.assert_array_equal(hits["prim"], prim)
     np.testing.assert_array_equal(np.stack([hits["u"], hits["v"]], axis=1), uv)
+    expected_normals = surface_normals(bvh.vertices, faces, prim)
+    tolerance = 1e-9 if precision == "float64" else 2e-4 if accuracy == "fast" else 1e-6  # fast: of edges
+    np.testing.assert_allclose(
+        hits["normal"], expected_normals, atol=tolerance if precision == "float32" else 1e-9
+    )
+    against = (expected_normals * directions).sum(axis=1)
+    sure = (prim < 0) | (np.abs(against) > 1e-3)
+    np.testing.assert_array_equal(hits["front"][sure], (against < 0)[sure])
+    assert 0.2 < hits["front"].mean() < 0.8 and sure.mean() > 0.99
     expected, _ = bvh.occluded("scalar", origins, directions, *limits(0, 0.03))
     assert 0.2 < expected.mean() < 0.9
     np.testing.assert_array_equal(occluded, expected)

@@ -7,9 +7,10 @@ from typing import Any
 
 import warp as wp
 
-from wive.warp_kernels.lanes.lanes import without_gradient
+from wive.warp_kernels.functions.normals import make_normal
+from wive.warp_kernels.lanes.lanes import address_of, without_gradient
 from wive.warp_kernels.lanes.layout import NO_PRIM
-from wive.warp_kernels.lanes.precision import PRECISIONS
+from wive.warp_kernels.lanes.precision import PRECISIONS, in_double
 from wive.warp_kernels.queries.frame import make_load_frame
 from wive.warp_kernels.queries.query_exact import query_of
 from wive.warp_kernels.traversal.traversal import make_traversal
@@ -39,6 +40,7 @@ def make_functions(
     handle_type, hit_type = HANDLES[accuracy, precision], HITS[precision]
     wanted = KINDS.index((accuracy, precision))
     real, vec3 = PRECISIONS[precision].real, PRECISIONS[precision].vec3
+    normal_of = make_normal(accuracy, precision)
     closest, any_, count = (query_of(name, accuracy, precision) for name in ("closest", "any", "count"))
     load_frame = make_load_frame(accuracy, precision)
     begin_closest, distance = closest.begin, closest.distance
@@ -52,9 +54,10 @@ def make_functions(
     def closest_hit(bvh: handle_type, origin: vec3, direction: vec3, tmin: real, tmax: real) -> hit_type:
         """The closest hit in the closed interval [tmin, tmax], t in multiples of the direction's length.
 
-        Bit for bit what `wive.Scene.intersect` returns. It takes the handle of a watertight tree (`Bvh`), of
-        a fast one (`FastBvh`) or of an exact one (`ExactBvh`); with those of float64 scenes (`Bvh64`,
-        `FastBvh64`) rays are vec3d and float64, and the hit is a `Hit64`. It has no gradient:
+        t, u, v and prim are bit for bit what `wive.Scene.intersect` returns; the normal and the side that was
+        hit are computed in double, and cost nothing if they are not used. It takes the handle of a watertight
+        tree (`Bvh`), of a fast one (`FastBvh`) or of an exact one (`ExactBvh`); with those of float64 scenes
+        (`Bvh64`, `FastBvh64`) rays are vec3d and float64, and the hit is a `Hit64`. It has no gradient:
         `differentiable_hit` has.
         """
         hit = hit_type()
@@ -62,6 +65,7 @@ def make_functions(
         hit.u = real(wp.nan)
         hit.v = real(wp.nan)
         hit.prim = NO_PRIM
+        hit.normal = vec3(real(wp.nan))
         ray = load_frame(bvh.center, origin, direction, tmin, tmax)
         if ray.valid and not _refused(bvh.error, bvh.kind, wanted):
             best = trace_closest(bvh, ray, 0, begin_closest(ray)).found
@@ -70,6 +74,10 @@ def make_functions(
                 hit.u = best.u
                 hit.v = best.v
                 hit.prim = best.prim
+                normal = normal_of(address_of(bvh.units), best.place)
+                unit = normal / wp.length(normal)
+                hit.normal = vec3(real(unit[0]), real(unit[1]), real(unit[2]))
+                hit.front = wp.dot(normal, in_double(direction)) < wp.float64(0.0)
         return hit
 
     @wp.func

@@ -43,6 +43,17 @@ def precision_of(array: wp.array) -> str:
     return "float64" if array.dtype in (wp.float64, wp.vec2d, wp.vec3d) else "float32"
 
 
+@wp.func
+def in_double(v: wp.vec3) -> wp.vec3d:
+    """The vector in double."""
+    return wp.vec3d(wp.float64(v[0]), wp.float64(v[1]), wp.float64(v[2]))
+
+
+@wp.func
+def in_double(v: wp.vec3d) -> wp.vec3d:
+    return v
+
+
 def stack_numbers(lanes: SimpleNamespace, precision: str, base: int) -> SimpleNamespace:
     """Numbers kept in the stack from word `base` on: store or load the i-th, or load three at once."""
     store_word, load_word, stack_argument = lanes.store_word, lanes.load_word, lanes.stack_argument

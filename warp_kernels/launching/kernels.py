@@ -15,7 +15,7 @@ from wive.warp_kernels.queries.frame import FRAMES, box_tmax, make_load_frame
 from wive.warp_kernels.queries.query_exact import query_of
 from wive.warp_kernels.traversal.states import TRAVERSALS
 from wive.warp_kernels.traversal.traversal import make_traversal
-from wive.warp_kernels.tree.handle import CORRUPTION, HANDLES, HITS
+from wive.warp_kernels.tree.handle import CORRUPTION, HANDLES, LISTED_HITS
 
 # Multiplications and additions stay apart: fused, the two triangles at an edge would not compute the same
 # numbers.
@@ -97,7 +97,7 @@ def make_kernel(
     if query == "closest":
         return _closest_kernel(parts, numbers, query_type.distance, length, counters)
     if query in ("all", "all_touching"):
-        return _all_kernel(parts, HITS[precision])
+        return _all_kernel(parts, LISTED_HITS[precision])
     return (_any_kernel if query == "any" else _count_kernel)(parts, length, counters)
 
 

@@ -11,7 +11,7 @@ import warp as wp
 from wive.warp_kernels.lanes.lanes import Lanes, expected_lanes
 from wive.warp_kernels.launching.kernels import make_kernel
 from wive.warp_kernels.launching.sorting import shift_counts, sort_kernel
-from wive.warp_kernels.tree.handle import HITS
+from wive.warp_kernels.tree.handle import LISTED_HITS
 from wive.warp_kernels.tree.quiet import cpu_blocks, launch
 from wive.warp_kernels.tree.tree import Tree
 
@@ -180,7 +180,7 @@ def _list_and_sort(
 ) -> None:
     """List hits at the places given by counts and offsets, in any order, then sort them into the outputs."""
     counts, offsets = places
-    hits = wp.empty(len(outputs[0]), dtype=HITS[tree.precision], device=tree.device)
+    hits = wp.empty(len(outputs[0]), dtype=LISTED_HITS[tree.precision], device=tree.device)
     _launch(query, tree, rays, (offsets, counts, hits), lanes, block_dim, None)
     sort = sort_kernel(tree.precision)
     launch(sort, len(counts), [offsets, counts, hits], list(outputs), device=tree.device, record_tape=False)

@@ -6,7 +6,7 @@ import warp as wp
 
 from wive.warp_kernels.lanes.layout import NO_PRIM
 from wive.warp_kernels.lanes.precision import PRECISIONS
-from wive.warp_kernels.tree.handle import HITS
+from wive.warp_kernels.tree.handle import LISTED_HITS
 
 # Shorter lists are sorted by insertion: fewer moves than a heap makes.
 SHORT = 16
@@ -15,7 +15,7 @@ SHORT = 16
 @functools.cache
 def sort_kernel(precision: str = "float32") -> wp.Kernel:
     """The kernel that sorts hits in trees of this precision, with dim n."""
-    numbers, hit_type = PRECISIONS[precision], HITS[precision]
+    numbers, hit_type = PRECISIONS[precision], LISTED_HITS[precision]
     real, vec2 = numbers.real, numbers.vec2
 
     @wp.func

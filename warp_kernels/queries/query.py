@@ -44,6 +44,7 @@ class Best:
     u: wp.float32
     v: wp.float32
     prim: wp.int32
+    place: wp.int32  # of its triangle in the tree, in the closest hit: its block plus its number there
 
 
 @wp.struct
@@ -53,7 +54,7 @@ class MultiHit:
     tmax: wp.float32  # in the frame's units
     count: wp.int32
     unscale: wp.float32  # as `RayFrame` has it
-    hits: wp.uint64  # address of the ray's first `Hit`
+    hits: wp.uint64  # address of the ray's first `ListedHit`
     remaining: wp.uint64  # address of the number of hits still to be listed
 
 

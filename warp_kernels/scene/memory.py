@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from wive import _cpu
 from wive.warp_kernels.launching.launch import MOST_HITS
 
-# While all hits are sorted, each is a Hit or Hit64 and a row of t, prim and uv.
+# While all hits are sorted, each is a ListedHit or ListedHit64 and a row of t, prim and uv.
 HIT_BYTES = {"float32": 16 + 16, "float64": 32 + 28}
 # Of the memory that is available; the rest is for what else needs some meanwhile.
 PARTS_FOR_HITS, PARTS = 3, 4

@@ -12,8 +12,8 @@ from typing import Any
 import warp as wp
 
 from wive._internal.sides import LEAST, SURE
-from wive.warp_kernels.lanes.precision import PRECISIONS
-from wive.warp_kernels.scene.surfaces import OPTIONS, in_double, vertices_of
+from wive.warp_kernels.lanes.precision import PRECISIONS, in_double
+from wive.warp_kernels.scene.surfaces import OPTIONS, vertices_of
 
 
 @wp.func_native("""

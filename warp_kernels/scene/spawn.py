@@ -12,8 +12,8 @@ import warp as wp
 
 from wive import _cpu
 from wive._internal import error_bounds, spawn
-from wive.warp_kernels.lanes.precision import PRECISIONS
-from wive.warp_kernels.scene.surfaces import OPTIONS, in_double, vertices_of
+from wive.warp_kernels.lanes.precision import PRECISIONS, in_double
+from wive.warp_kernels.scene.surfaces import OPTIONS, vertices_of
 
 BoundConstants = wp.types.vector(3, wp.float64)
 SpawnConstants = wp.types.vector(len(spawn.Rounding._fields), wp.float64)

@@ -1,26 +1,15 @@
 """Points and normals of triangles hit, computed on a Warp device in double."""
 
-# mypy: disable-error-code="untyped-decorator, valid-type, no-redef"
+# mypy: disable-error-code="untyped-decorator, valid-type"
 
 import functools
 from types import SimpleNamespace
 
 import warp as wp
 
-from wive.warp_kernels.lanes.precision import PRECISIONS
+from wive.warp_kernels.lanes.precision import PRECISIONS, in_double
 
 OPTIONS = {"enable_backward": False, "fuse_fp": False}
-
-
-@wp.func
-def in_double(v: wp.vec3) -> wp.vec3d:
-    """The vector in double."""
-    return wp.vec3d(wp.float64(v[0]), wp.float64(v[1]), wp.float64(v[2]))
-
-
-@wp.func
-def in_double(v: wp.vec3d) -> wp.vec3d:
-    return v
 
 
 @wp.func

@@ -13,6 +13,7 @@ from wive.warp_kernels.traversal.states import LEAVES
 def make_offer(query: Query, lanes: SimpleNamespace, triangles: SimpleNamespace, real: type) -> wp.Function:
     """The function that solves a triangle for t, u and v and offers them to the query."""
     offer, solve, state_type = query.offer, triangles.solve, query.state
+    keeps_place: bool = query.distance is not None
     stack_argument = lanes.stack_argument
 
     @without_gradient
@@ -27,7 +28,11 @@ def make_offer(query: Query, lanes: SimpleNamespace, triangles: SimpleNamespace,
         tmin: real,
         stack: stack_argument,
     ):
-        return offer(found, tmin, solve(units, block, j, stack, negative), prim)
+        offered = offer(found, tmin, solve(units, block, j, stack, negative), prim)
+        if wp.static(keeps_place):
+            if offered.prim == prim:
+                offered.place = block + j
+        return offered
 
     return offer_triangle
 

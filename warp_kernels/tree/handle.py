@@ -40,11 +40,8 @@ FastBvh64 = derive_struct(Bvh, "FastBvh64", "A tree of float64 vertices, otherwi
 
 
 @wp.struct
-class Hit:
-    """The closest hit: t in multiples of the direction's length; infinity, NaN, NaN and -1 on a miss.
-
-    The point is (1 - u - v) v0 + u v1 + v v2 of triangle `prim`.
-    """
+class ListedHit:
+    """One of all hits along a ray, as `Hit`."""
 
     t: wp.float32
     u: wp.float32
@@ -52,7 +49,24 @@ class Hit:
     prim: wp.int32
 
 
-Hit64 = derive_struct(Hit, "Hit64", "A hit in a float64 tree.", t=wp.float64, u=wp.float64, v=wp.float64)
+@wp.struct
+class Hit:
+    """The closest hit: t in multiples of the direction's length; infinity, NaN, NaN and -1 on a miss.
+
+    The point is (1 - u - v) v0 + u v1 + v v2 of triangle `prim`. On a miss the normal is NaN and front false.
+    """
+
+    t: wp.float32
+    u: wp.float32
+    v: wp.float32
+    prim: wp.int32
+    normal: wp.vec3  # of unit length, by the right-hand winding, whichever side the ray came from
+    front: wp.bool  # whether the ray came from the side that the normal points to
+
+
+_DOUBLE = {"t": wp.float64, "u": wp.float64, "v": wp.float64}
+ListedHit64 = derive_struct(ListedHit, "ListedHit64", "A listed hit in a float64 tree.", **_DOUBLE)
+Hit64 = derive_struct(Hit, "Hit64", "A hit in a float64 tree, as `Hit`.", **_DOUBLE, normal=wp.vec3d)
 
 # By accuracy and precision: exact trees are float32.
 HANDLES: dict[tuple[str, str], Any] = {
@@ -64,6 +78,7 @@ HANDLES: dict[tuple[str, str], Any] = {
 }
 KINDS = list(HANDLES)
 HITS: dict[str, Any] = {"float32": Hit, "float64": Hit64}
+LISTED_HITS: dict[str, Any] = {"float32": ListedHit, "float64": ListedHit64}
 
 
 def _argument(handle: Any) -> Any:
