@@ -42,6 +42,7 @@ RULES = {
     "max": Rule("larger({a}, {b})"),
     "min": Rule("smaller({a}, {b})"),
     "mov": Rule("{a}"),
+    "mul": Rule("{a} * {b}"),
     "mul.lo": Rule("{a} * {b}"),
     "mul.rn": Rule("{a} * {b}"),
     "neg": Rule("-{a}"),
