@@ -218,13 +218,13 @@ def interface_arrays(case: Case) -> Wrong:
     return compared({name: getattr(hits, name).numpy() for name in ("t", "prim")}, truth(case))
 
 
-def own_kernel(case: Case, **options: Any) -> Wrong:
-    """A user's kernel that calls `closest_hit`, compiled with these module options."""
+def own_kernel(case: Case) -> Wrong:
+    """A user's kernel that calls `closest_hit`, compiled with Warp's default options."""
     from wive import warp_kernels
 
     handle_type, closest_hit = warp_kernels.Bvh, warp_kernels.closest_hit
 
-    @wp.kernel(module="unique", enable_backward=False, module_options=options)
+    @wp.kernel(module="unique", enable_backward=False)
     def cast(
         bvh: handle_type,
         origins: wp.array(dtype=wp.vec3),
@@ -245,11 +245,6 @@ def own_kernel(case: Case, **options: Any) -> Wrong:
     return compared({"t": t.numpy(), "prim": prim.numpy()}, truth(case))
 
 
-def own_fast_math_kernel(case: Case) -> Wrong:
-    """`own_kernel` with fast_math, which may change bits."""
-    return own_kernel(case, fast_math=True)
-
-
 def torch_side_stream(case: Case) -> Wrong:
     """`torch_tensors` on a stream beside the default one."""
     return torch_tensors(case, on_side_stream=True)
@@ -265,5 +260,4 @@ ATTEMPTS = {
     "jax": Attempt(jax_arrays, needs_gpu=False),
     "__cuda_array_interface__, side stream": Attempt(interface_arrays, needs_gpu=True),
     "own kernel": Attempt(own_kernel, needs_gpu=False),
-    "own kernel, fast_math": Attempt(own_fast_math_kernel, needs_gpu=False),
 }

@@ -107,8 +107,10 @@ class WarpArrays(_OnWarpStream):
         return wp.array(array, device="cpu", copy=False, **dtype)
 
     def to_warp(self, array: Any, device: str) -> Any:
-        """The array itself."""
-        return array
+        """The array itself; a copy of the rows that an indexed array chooses."""
+        import warp as wp
+
+        return array if isinstance(array, wp.array) else array.contiguous()
 
     def from_warp(self, array: Any) -> Any:
         """The array itself, or its vectors as rows of two or three numbers."""
@@ -251,7 +253,7 @@ def library_of(value: Any) -> Library:
     if isinstance(value, NUMPY_TYPES):
         return NUMPY
     torch, warp = sys.modules.get("torch"), sys.modules.get("warp")
-    if warp is not None and isinstance(value, warp.array):
+    if warp is not None and isinstance(value, (warp.array, warp.indexedarray)):
         return WARP_VECTORS if value.dtype in (warp.vec3, warp.vec3d) else WARP_NUMBERS
     if torch is not None and isinstance(value, torch.Tensor):
         return TORCH
