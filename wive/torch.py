@@ -83,11 +83,11 @@ def _corners(scene: Scene, prim: torch.Tensor, vertices: torch.Tensor | None) ->
     if vertices is not None:
         _expect_fitting(scene, prim, vertices)
     first = prim.clamp(min=0)
-    if not prim.is_cuda:
+    if scene.device is None:
         faces = scene.faces[first.numpy()]
-        return (
-            torch.from_numpy(scene.vertices[faces]) if vertices is None else vertices[torch.from_numpy(faces)]
-        )
+        if vertices is None:
+            return torch.from_numpy(scene.vertices[faces])
+        return vertices[torch.from_numpy(faces)]
     import warp as wp
 
     of_scene, faces = (wp.to_torch(array) for array in scene._tracer.mesh)  # type: ignore[attr-defined]

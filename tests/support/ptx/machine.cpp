@@ -16,7 +16,7 @@ Block block;
 namespace {
 
 constexpr unsigned WARP = 32;
-constexpr std::size_t STACK_BYTES = 1 << 17;
+constexpr std::size_t STACK_BYTES = 1 << 18;
 // One access to shared memory in so many lets another thread run first.
 constexpr unsigned ACCESSES_PER_SWITCH = 16;
 
