@@ -85,6 +85,17 @@ def test_a_kernel_that_is_not_in_the_cache_is_said_to_be_compiled(
     assert capsys.readouterr().err == ""
 
 
+def test_a_launch_of_nothing_is_not_said_to_compile(
+    settings: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    wp.config.kernel_cache_dir, wp.config.log_level = str(tmp_path), wp.LOG_INFO
+    settings.setattr(quiet, "_launched", set())
+    none = wp.empty(0, dtype=wp.float32, device="cpu")
+    for dim in (0, (0, 8), (3, 0)):
+        quiet.launch(INVERT_ORDERS["float32"], dim, [none], [], device="cpu")
+    assert capsys.readouterr().err == "" and quiet._launched == set()
+
+
 def test_a_process_says_what_it_compiles_and_nothing_if_all_is_compiled(tmp_path: Path) -> None:
     code = """
 import warp as wp, wive

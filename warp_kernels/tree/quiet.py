@@ -61,8 +61,9 @@ def launch(kernel: Any, dim: Any, inputs: list[Any], outputs: list[Any], **optio
     The first launch of a kernel on a device says so on standard error if Warp has to compile it.
     """
     build = kernel, str(options.get("device")), options.get("block_dim")
+    nothing = 0 in (dim if isinstance(dim, tuple) else (dim,))
     with _cpu.DefaultFloats():
-        if build in _launched:
+        if build in _launched or nothing:
             wp.launch(kernel, dim, inputs, outputs, **options)
             return
         _say_if_compiled(kernel, **options)
