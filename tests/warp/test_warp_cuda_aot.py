@@ -23,23 +23,18 @@ from wive.warp_kernels.launching import sorting
 from wive.warp_kernels.launching.kernels import make_kernel
 from wive.warp_kernels.launching.launch import MOST_CUDA_THREADS, default_block_dim
 
-ARCHITECTURES = (80, 90, 100)
 STACK = 96
 BLOCK = 256  # Warp's own
 BLOCK_REGISTERS = 64 * 1024  # on every CUDA device
 QUERIES = ("closest", "any", "count", "all")
 
-# Every query on one architecture, and on the others those two that hold nearly all there is to compile; exact
-# trees, which take longest, on one architecture.
-_BUILDS = [(query, 90) for query in QUERIES] + [
-    (query, architecture)
-    for query in ("closest", "any")
-    for architecture in ARCHITECTURES
-    if architecture != 90
-]
+# Every query on one architecture, and on the others those two that hold nearly all there is to compile, in
+# the accuracy that has more of it; exact trees, which take longest, on one architecture.
 EXACT_QUERIES = ("closest", "count")
-BUILDS = [(*build, accuracy) for build in _BUILDS for accuracy in ("fast", "watertight")] + [
-    (query, 90, "exact") for query in EXACT_QUERIES
+BUILDS = [
+    *[(query, 90, accuracy) for query in QUERIES for accuracy in ("fast", "watertight")],
+    *[(query, architecture, "watertight") for query in ("closest", "any") for architecture in (80, 100)],
+    *[(query, 90, "exact") for query in EXACT_QUERIES],
 ]
 COMPRESSED_BUILDS = [(query, accuracy) for query in QUERIES for accuracy in ("fast", "watertight")] + [
     (query, "exact") for query in EXACT_QUERIES
