@@ -23,6 +23,7 @@ Hits are those of the C++ backends, bit for bit; on a miss t is infinity, prim -
 
 from typing import TYPE_CHECKING, Any
 
+from wive.warp_kernels.launching.closest_points import launch_closest_points
 from wive.warp_kernels.launching.launch import (
     MOST_HITS,
     launch_all,
@@ -59,6 +60,7 @@ __all__ = [
     "launch_all",
     "launch_any",
     "launch_closest",
+    "launch_closest_points",
     "launch_count",
     "scan_counts",
     "upload",

@@ -23,6 +23,7 @@ from wive._internal.thread_setting import set_threads
 from wive.all_hits import AllHits
 from wive.backend import Backend, backends
 from wive.camera import Camera
+from wive.closest import Closest
 from wive.colors import load_colors
 from wive.geoms import Geoms
 from wive.hits import Hits, Stats
@@ -37,6 +38,7 @@ __all__ = [
     "AllHits",
     "Backend",
     "Camera",
+    "Closest",
     "EquirectangularCamera",
     "Geoms",
     "Hits",

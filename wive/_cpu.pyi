@@ -15,6 +15,7 @@ Real: TypeAlias = np.floating[Any]  # float32 or float64, the same for all array
 
 compiler: str  # the C++ compiler's name and version
 exact_source: str  # C++ text of the exact arithmetic, which the Warp kernels compile as well
+distance_source: str  # C++ text of TriangleDistance, which the Warp kernels compile as well
 surface_source: str  # C++ text of ErrorBound and SpawnOrigin, which the Warp kernels compile as well
 
 def kernels() -> dict[str, str]:
@@ -209,6 +210,18 @@ class Bvh:
         touching: bool = False,
     ) -> tuple[NDArray[np.int32], NDArray[np.int32] | None]:
         """How many hits each ray has in [tmin, tmax]: (n,) int32, and stats (n,3) or None."""
+    def closest(
+        self, kernel: Kernels | str, points: NDArray[Real], max_distance: NDArray[Real], threads: int = 0
+    ) -> tuple[NDArray[Any], NDArray[np.int32], NDArray[Any]]:
+        """The closest triangles: distance (n,), prim (n,), uv (n,2); inf, -1 and NaN if none is near enough.
+
+        distance and uv have the tree's dtype. max_distance has one element or n, none negative or NaN.
+        """
+    def winding(self, points: NDArray[Real], threads: int = 0) -> NDArray[np.float64]:
+        """(n,) the generalised winding number round each point; NaN if it is no finite point.
+
+        The first call makes a table over the tree, which takes as long as a small part of building it.
+        """
     def intersect_ready(
         self, kernel: Kernels, origins: object, directions: object, tmin: object, tmax: object
     ) -> tuple[NDArray[Any], NDArray[np.int32], NDArray[Any], None] | None:

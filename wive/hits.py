@@ -63,7 +63,69 @@ def geoms_of(hits: OfMeshes) -> Geoms:
     return hits._geoms or one_geom(len(hits.faces), len(hits.vertices))
 
 
-class Hits(ReadOnly):
+class OnSurface:
+    """Places on triangles of a mesh: `prim` (n,), -1 for none, and `uv` (n,2)."""
+
+    prim: NDArray[np.int32]
+    uv: Floats
+    vertices: Floats
+    faces: NDArray[np.int32]
+    _geoms: Geoms | None
+
+    @property
+    def mask(self) -> NDArray[np.bool_]:
+        """(n,) bool, true if there is a triangle: the ray hit something, or a point is close to it."""
+        return self.prim >= 0
+
+    @property
+    def geom(self) -> NDArray[np.int32]:
+        """(n,) int32, the mesh that was hit, as `Scene.from_meshes` numbers them; -1 on a miss.
+
+        Computed when read; 0 for every hit in a scene of one mesh.
+        """
+        return geoms_of(self).of(self.prim)
+
+    @property
+    def geom_prim(self) -> NDArray[np.int32]:
+        """(n,) int32, the triangle that was hit as a row of the faces of its own mesh; -1 on a miss.
+
+        Computed when read; `prim` in a scene of one mesh.
+        """
+        return geoms_of(self).within(self.prim)
+
+    def points(self) -> NDArray[np.float64]:
+        """(n,3) float64 points from the barycentrics; NaN on a miss.
+
+        Computed at each call, in float64: rounding to float32 would move points off triangles that lie far
+        from the origin.
+        """
+        return surface_points(self.vertices, self.faces, self.prim, self.uv)
+
+    def normals(self) -> NDArray[np.float64]:
+        """(n,3) float64 unit normals of the triangles, by the right-hand winding; NaN on a miss.
+
+        Computed at each call. The normal is the triangle's, whichever side the ray or point came from.
+        """
+        return surface_normals(self.vertices, self.faces, self.prim)
+
+    def interpolate(self, vertex_values: ArrayLike) -> Floats:
+        """Values given at the vertices, at the points hit: (1-u-v) a + u b + v c; NaN on a miss.
+
+        Arguments:
+            vertex_values: (v,) or (v,k) real numbers, one row per vertex of the scene: colours, temperatures,
+                smooth normals. A masked number counts as NaN.
+
+        Returns (n,) or (n,k), computed in float64: float32 if the values are float16 or float32, else
+        float64. On a Warp device the values are float32 or float64, or NumPy's, which are copied there.
+        Raises ValueError or TypeError that names the argument.
+
+        >>> smooth = hits.interpolate(vertex_normals)
+        """
+        values = vertex_values_of(host_array("vertex_values", vertex_values), len(self.vertices))
+        return interpolated(values, self.faces, self.prim, self.uv)
+
+
+class Hits(OnSurface, ReadOnly):
     """The closest hit of each of n rays; if these have another leading shape, (n,) below is that shape.
 
     Arrays are NumPy's if the rays were, else of the library and on the device that the rays came in;
@@ -80,14 +142,9 @@ class Hits(ReadOnly):
     """
 
     t: Floats
-    prim: NDArray[np.int32]
-    uv: Floats
-    vertices: Floats
-    faces: NDArray[np.int32]
     _rays: Rays | None
     _accuracy: str
     _moved: Moved | None
-    _geoms: Geoms | None
 
     def __init__(
         self,
@@ -115,42 +172,6 @@ class Hits(ReadOnly):
             "_geoms": geoms,
         }
         object.__setattr__(self, "__dict__", attributes)
-
-    @property
-    def mask(self) -> NDArray[np.bool_]:
-        """(n,) bool, true if the ray hit something."""
-        return self.prim >= 0
-
-    @property
-    def geom(self) -> NDArray[np.int32]:
-        """(n,) int32, the mesh that was hit, as `Scene.from_meshes` numbers them; -1 on a miss.
-
-        Computed when read; 0 for every hit in a scene of one mesh.
-        """
-        return geoms_of(self).of(self.prim)
-
-    @property
-    def geom_prim(self) -> NDArray[np.int32]:
-        """(n,) int32, the triangle that was hit as a row of the faces of its own mesh; -1 on a miss.
-
-        Computed when read; `prim` in a scene of one mesh.
-        """
-        return geoms_of(self).within(self.prim)
-
-    def points(self) -> NDArray[np.float64]:
-        """(n,3) float64 hit points from the barycentrics; NaN on a miss.
-
-        Computed at each call, in float64: rounding to float32 would move points off triangles that lie far
-        from the origin.
-        """
-        return surface_points(self.vertices, self.faces, self.prim, self.uv)
-
-    def normals(self) -> NDArray[np.float64]:
-        """(n,3) float64 unit normals of the triangles hit, by the right-hand winding; NaN on a miss.
-
-        Computed at each call. The normal is the triangle's, whichever side the ray came from.
-        """
-        return surface_normals(self.vertices, self.faces, self.prim)
 
     @property
     def error_bound(self) -> NDArray[np.float64]:
@@ -217,22 +238,6 @@ class Hits(ReadOnly):
         ValueError if no scene returned these hits.
         """
         return cosines_of(self.normals(), self._directions("cosines"))
-
-    def interpolate(self, vertex_values: ArrayLike) -> Floats:
-        """Values given at the vertices, at the points hit: (1-u-v) a + u b + v c; NaN on a miss.
-
-        Arguments:
-            vertex_values: (v,) or (v,k) real numbers, one row per vertex of the scene: colours, temperatures,
-                smooth normals. A masked number counts as NaN.
-
-        Returns (n,) or (n,k), computed in float64: float32 if the values are float16 or float32, else
-        float64. On a Warp device the values are float32 or float64, or NumPy's, which are copied there.
-        Raises ValueError or TypeError that names the argument.
-
-        >>> smooth = hits.interpolate(vertex_normals)
-        """
-        values = vertex_values_of(host_array("vertex_values", vertex_values), len(self.vertices))
-        return interpolated(values, self.faces, self.prim, self.uv)
 
     def _directions(self, wanted: str) -> Floats:
         if self._rays is None:

@@ -18,6 +18,7 @@ from wive._internal.heightfield import heightfield_mesh
 from wive._internal.host_arrays import host_array
 from wive._internal.lines import one_line
 from wive._internal.mesh_objects import MeshObject, PlacedMeshes, mesh_arrays
+from wive._internal.point_queries import PointQueries
 from wive._internal.precision import Floats, Precision, real_of
 from wive._internal.queries import Queries
 from wive._internal.several_meshes import Joined, Pair, join, name_the_mesh, refitted_mesh
@@ -40,8 +41,8 @@ if TYPE_CHECKING:
     from wive.warp_kernels import Tree
 
 
-class Scene(Queries):
-    """A triangle mesh that answers ray queries.
+class Scene(Queries, PointQueries):
+    """A triangle mesh that answers queries of rays and points.
 
     Several threads may query it at once, and so may processes forked from this one. Only `refit` changes it,
     all at once: a query sees the old positions or the new ones.

@@ -31,6 +31,7 @@ bool has_avx512() { return false; }
 
 struct Entry {
     std::string_view name;
+    IsaName isa;
     const KernelTable<float>* (*kernels)();           // for "avx512" the first call chooses one of two forms
     const KernelTable<double>* (*float64_kernels)();  // null for a traversal of float32 scenes only
     bool compiled, runs;
@@ -42,11 +43,11 @@ const std::vector<Entry>& entries() {
     constexpr std::string_view avx512 = "AVX-512 F, VL, DQ or BW", avx2 = "AVX2, FMA, BMI1, BMI2, LZCNT or POPCNT";
     static const bool x86_64 = avx512_half_kernels() != nullptr;
     static const std::vector<Entry> all = {
-        {"avx512", avx512_kernels, avx512_float64_kernels, x86_64, has_avx512(), avx512},
-        {"avx512.full", avx512_full_kernels, avx512_float64_kernels, x86_64, has_avx512(), avx512},
-        {"avx512.half", avx512_half_kernels, nullptr, x86_64, has_avx512(), avx512},
-        {"avx2", avx2_kernels, avx2_float64_kernels, x86_64, has_avx2(), avx2},
-        {"scalar", scalar_kernels, scalar_float64_kernels, true, true, ""},
+        {"avx512", IsaName::avx512, avx512_kernels, avx512_float64_kernels, x86_64, has_avx512(), avx512},
+        {"avx512.full", IsaName::avx512, avx512_full_kernels, avx512_float64_kernels, x86_64, has_avx512(), avx512},
+        {"avx512.half", IsaName::avx512, avx512_half_kernels, nullptr, x86_64, has_avx512(), avx512},
+        {"avx2", IsaName::avx2, avx2_kernels, avx2_float64_kernels, x86_64, has_avx2(), avx2},
+        {"scalar", IsaName::scalar, scalar_kernels, scalar_float64_kernels, true, true, ""},
     };
     return all;
 }
@@ -55,6 +56,17 @@ std::string why_not(const Entry& entry) {
     if (!entry.compiled) return "this build is for another processor architecture than x86-64";
     if (!entry.runs) return "this processor lacks " + std::string(entry.needs);
     return "";
+}
+
+// The entry of a name that this machine can run.
+const Entry& find_entry(std::string_view name) {
+    for (const Entry& entry : entries()) {
+        if (entry.name != name) continue;
+        if (const std::string reason = why_not(entry); !reason.empty())
+            throw std::invalid_argument("kernel '" + std::string(name) + "' can't run here: " + reason);
+        return entry;
+    }
+    throw std::invalid_argument("unknown kernel '" + std::string(name) + "'");
 }
 
 }  // namespace
@@ -67,23 +79,20 @@ std::vector<std::pair<std::string, std::string>> list_kernels() {
 
 template <class Real>
 const KernelTable<Real>& find_kernels(std::string_view name) {
-    for (const Entry& entry : entries()) {
-        if (entry.name != name) continue;
-        if (const std::string reason = why_not(entry); !reason.empty())
-            throw std::invalid_argument("kernel '" + std::string(name) + "' can't run here: " + reason);
-        if constexpr (precision_of<Real> == Precision::float32)
-            return *entry.kernels();
-        else if (entry.float64_kernels != nullptr)
-            return *entry.float64_kernels();
-        else
-            throw std::invalid_argument(
-                "kernel '" + std::string(name) +
-                "' traces float32 scenes only: give vertices in float32, or use 'avx512', 'avx2' or 'scalar'");
-    }
-    throw std::invalid_argument("unknown kernel '" + std::string(name) + "'");
+    const Entry& entry = find_entry(name);
+    if constexpr (precision_of<Real> == Precision::float32)
+        return *entry.kernels();
+    else if (entry.float64_kernels != nullptr)
+        return *entry.float64_kernels();
+    else
+        throw std::invalid_argument(
+            "kernel '" + std::string(name) +
+            "' traces float32 scenes only: give vertices in float32, or use 'avx512', 'avx2' or 'scalar'");
 }
 
 template const KernelTable<float>& find_kernels(std::string_view);
 template const KernelTable<double>& find_kernels(std::string_view);
+
+IsaName find_isa(std::string_view name) { return find_entry(name).isa; }
 
 }  // namespace wive

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "kernels/kernels.h"
+#include "kernels/parts.h"
 
 namespace wive {
 
@@ -17,5 +18,8 @@ std::vector<std::pair<std::string, std::string>> list_kernels();
 // or has no such table.
 template <class Real>
 const KernelTable<Real>& find_kernels(std::string_view name);
+
+// The instruction set of a kernel name. Throws as find_kernels does.
+IsaName find_isa(std::string_view name);
 
 }  // namespace wive

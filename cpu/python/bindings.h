@@ -8,6 +8,7 @@
 
 #include <atomic>
 #include <memory>
+#include <mutex>
 #include <stdexcept>
 #include <string>
 #include <tuple>
@@ -15,6 +16,7 @@
 #include <variant>
 
 #include "build/builder.h"
+#include "build/winding.h"
 #include "core/default_floats.h"
 #include "core/poll.h"
 #include "kernels/dispatch.h"
@@ -113,11 +115,24 @@ public:
                    : "expected arrays in float32, as the vertices are, got float64");
     }
 
+    // Made by the first call, for scenes that are asked for winding numbers.
+    template <class Real>
+    const WindingTable<Real>& winding() const {
+        std::call_once(winding_made_,
+                       [this] { winding_.emplace<Winding<Real>>(new WindingTable(*bvh_, mesh<Real>())); });
+        return *std::get<Winding<Real>>(winding_);
+    }
+
 private:
+    template <class Real>
+    using Winding = std::unique_ptr<const WindingTable<Real>>;
+
     std::variant<Array<float>, Array<double>> vertices_;
     Array<std::int32_t> faces_;
     BuildOptions options_;
     std::unique_ptr<Bvh> bvh_;
+    mutable std::once_flag winding_made_;
+    mutable std::variant<Winding<float>, Winding<double>> winding_;
 };
 
 // The kernels of one name, looked up by the first query of each precision and then kept. Not earlier: to look up
@@ -165,8 +180,9 @@ void for_each_precision(const Define& define) {
 using PyBvhClass = py::class_<PyBvh>;
 
 // Defined in bindings_queries.cpp: ray queries. In bindings_surface.cpp: points and normals of hits. In
-// bindings_spawn.cpp: spawned rays. In bindings_segments.cpp: line of sight.
+// bindings_closest.cpp: closest points. In bindings_spawn.cpp: spawned rays. In bindings_segments.cpp: line of sight.
 void bind_queries(PyBvhClass& bvh);
+void bind_closest(PyBvhClass& bvh);
 void bind_surface(py::module_& m);
 void bind_spawn(py::module_& m);
 void bind_segments(py::module_& m);

@@ -130,6 +130,7 @@ py::array_t<double> error_bounds(const Array<Real>& vertices, const Array<std::i
 
 void bind_surface(py::module_& m) {
     m.attr("surface_source") = surface_source;
+    m.attr("distance_source") = distance_source;
     for_each_precision([&]<class Real>(Real) {
         m.def("surface_points", &points<Real>, array_arg("vertices"), array_arg("faces"), array_arg("prim"),
               array_arg("uv"));

@@ -112,6 +112,15 @@ class WarpHits:
         return output
 
 
+class WarpClosest(WarpHits):
+    """The arrays of `wive.Closest` as Warp's: distance and prim (n,), uv (n,) vec2 or vec2d."""
+
+    def __init__(self, tracer: WarpTracer, distance: Any, prim: Any, uv: Any) -> None:
+        """Keep the arrays."""
+        super().__init__(tracer, distance, prim, uv)
+        self.distance = distance
+
+
 class WarpAllHits(WarpHits):
     """The arrays of `wive.AllHits` as Warp's: offsets (n+1,) int64, t and prim (h,), uv (h,) vec2."""
 

@@ -10,6 +10,7 @@ from wive._internal import arguments
 from wive._internal.arrays import NUMPY, WARP_NUMBERS, Library, library_of, lies_on
 from wive._internal.distant import Traced
 from wive._internal.interpolation import vertex_values_of
+from wive._internal.points import Points, largest_distances
 from wive._internal.precision import FLOAT32, Floats, Real
 from wive._internal.rays import Rays
 from wive.warp_kernels.lanes.precision import PRECISIONS, precision_of
@@ -83,6 +84,18 @@ class RayLoader:
             self._limit("tmin", rays.tmin, of_tmin, count),
             self._limit("tmax", rays.tmax, of_tmax, count),
         )
+
+    def points(self, points: Points) -> tuple[Any, Any]:
+        """Points (n,) vec3 and largest distances (1,) or (n,); NumPy's are copied to the device."""
+        if points.library is NUMPY:
+            rows, most = points.numpy(self.numbers)
+            return wp.array(rows, dtype=self._vec3, device=self.device, copy=False), self._limit_of_numpy(
+                most
+            )
+        rows, _ = self._vectors("points", points.points, points.libraries[0])
+        if points.libraries[1] is NUMPY:
+            largest_distances(points.max_distance, 1, self.numbers)
+        return rows, self._limit("max_distance", points.max_distance, points.libraries[1], len(rows))
 
     def directions(self, value: Any, count: int) -> Any:
         """(count,) vec3 of directions (count,3), or (3,) for all; NumPy's are copied to the device."""

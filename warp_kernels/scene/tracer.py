@@ -15,23 +15,26 @@ from wive._internal.arguments import Lanes, Work
 from wive._internal.arrays import NUMPY
 from wive._internal.distant import Ball, Moved, moved
 from wive._internal.picture import Image, Look
+from wive._internal.points import Points
 from wive._internal.precision import Floats, real_of
 from wive._internal.rays import Rays
 from wive._internal.wrapping import Wrapping
 from wive.all_hits import AllHits, WrappedAllHits
+from wive.closest import Closest, WrappedClosest
 from wive.geoms import Geoms, one_geom
 from wive.hits import Hits, Stats, WrappedHits
 from wive.warp_kernels import (
     launch_all,
     launch_any,
     launch_closest,
+    launch_closest_points,
     launch_count,
     scan_counts,
     upload,
 )
 from wive.warp_kernels.lanes.lanes import expected_lanes
 from wive.warp_kernels.lanes.precision import PRECISIONS
-from wive.warp_kernels.scene.hits import WarpAllHits, WarpHits
+from wive.warp_kernels.scene.hits import WarpAllHits, WarpClosest, WarpHits
 from wive.warp_kernels.scene.memory import expect_hits_fit, memory_errors
 from wive.warp_kernels.scene.rays import RayLoader, WarpRays
 from wive.warp_kernels.tree.tree import check_memory
@@ -169,6 +172,23 @@ class WarpTracer:
             hits = WarpAllHits(self, offsets, t, prim, uv)
             return WrappedAllHits(hits, self._wrapping(rays)), _stats(steps, rays)
 
+    def closest(self, points: Points, work: Work) -> Closest:
+        """The surface's closest points."""
+        library = points.library
+        with library.on_stream(self.device), memory_errors():
+            rows, most = self.loader.points(points)
+            distance, prim, uv = self._outputs(len(rows))
+            launch_closest_points(self.tree, rows, most, distance, prim, uv)
+            if library is not NUMPY:
+                home = WarpClosest(self, distance, prim, uv)
+                return WrappedClosest(home, Wrapping(library, self.device, _FromWarp(points)))
+            check(self.tree)
+            found = distance.numpy(), prim.numpy(), uv.numpy()
+            closest = Closest(*found, self.vertices, self.faces, self.geoms)
+            if points.leading is None:
+                return closest
+            return WrappedClosest(closest, Wrapping(library, self.device, points.shaped()))
+
     def refitted(self, vertices: Floats) -> WarpTracer:
         """A tracer of moved vertices, as many as before."""
         return WarpTracer(self.bvh.refitted(vertices), self.faces, self.device, self.geoms)
@@ -225,6 +245,16 @@ class WarpTracer:
 
     def _wrapping(self, rays: Rays) -> Wrapping:
         return Wrapping(rays.library, self.device, rays.library.from_warp)
+
+
+class _FromWarp:
+    """Warp's arrays (n,...) as those of the points' library, in their shape."""
+
+    def __init__(self, points: Points) -> None:
+        self._library, self._shaped = points.library, points.shaped()
+
+    def __call__(self, array: Any) -> Any:
+        return self._shaped(self._library.from_warp(array))
 
 
 def _arrays(rays: WarpRays) -> tuple[Any, Any, Any, Any]:

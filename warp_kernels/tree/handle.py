@@ -28,6 +28,7 @@ class Bvh:
     units: wp.array(dtype=wp.float32)  # nodes, then triangle blocks
     error: wp.array(dtype=wp.int32)  # two words, CORRUPTION and REFUSAL
     center: wp.vec3
+    extent: wp.float32  # the largest |coordinate - center|
     step_limit: wp.int32  # no traversal of a sound tree takes more steps
     stack: wp.int32  # stack size that a traversal may need
     kind: wp.int32  # index into KINDS: a handle of another type has another
@@ -44,6 +45,16 @@ class ListedHit:
     """One of all hits along a ray, as `Hit`."""
 
     t: wp.float32
+    u: wp.float32
+    v: wp.float32
+    prim: wp.int32
+
+
+@wp.struct
+class ClosestPoint:
+    """The closest point of the surface: u and v of `prim`; infinity, NaN and -1 if there is none."""
+
+    distance: wp.float32
     u: wp.float32
     v: wp.float32
     prim: wp.int32

@@ -328,12 +328,12 @@ def vectors(name: str, value: ArrayLike, real: Real, may_be_one: bool = True, co
     return _missing_if_masked(value, array, real)
 
 
-def limits(name: str, value: ArrayLike, count: int, real: Real = FLOAT32) -> Floats:
-    """The limits of `count` rays, (1,) or (count,) of `real`'s dtype."""
-    array = _numeric(name, value, "a real number or one per ray", "fiu", masked=True)
+def limits(name: str, value: ArrayLike, count: int, real: Real = FLOAT32, whose: str = "ray") -> Floats:
+    """The limits of `count` rays or points, (1,) or (count,) of `real`'s dtype."""
+    array = _numeric(name, value, f"a real number or one per {whose}", "fiu", masked=True)
     if array.shape not in ((), (count,)):
         raise ValueError(
-            f"{name} must be one number or have shape ({count},), one per ray, got shape {array.shape}"
+            f"{name} must be one number or have shape ({count},), one per {whose}, got shape {array.shape}"
         )
     return _missing_if_masked(value, array, real).reshape(-1)
 

@@ -14,10 +14,12 @@ from wive._internal.arguments import Work
 from wive._internal.arrays import NUMPY
 from wive._internal.distant import Ball, Moved, Traced, moved
 from wive._internal.picture import Image, Look
+from wive._internal.points import Points
 from wive._internal.precision import Floats, real_of
 from wive._internal.rays import Rays, rays_of_numpy
 from wive._internal.wrapping import Wrapping
 from wive.all_hits import AllHits, WrappedAllHits
+from wive.closest import Closest, WrappedClosest
 from wive.geoms import Geoms
 from wive.hits import Hits, Stats, WrappedHits, stats_of
 
@@ -110,6 +112,15 @@ class CpuTracer:
             hits = WrappedAllHits(hits, _wrapping(rays))
         return hits, None if steps is None else stats_of(steps, rays.library)
 
+    def closest(self, points: Points, work: Work) -> Closest:
+        """The surface's closest points."""
+        arrays = points.numpy(self._real)
+        found = self.bvh.closest(self._kernels, *arrays, work.threads)
+        closest = Closest(*found, self._vertices, self._faces, self.geoms)
+        if points.library is NUMPY and points.leading is None:
+            return closest
+        return WrappedClosest(closest, Wrapping(points.library, "cpu", _Wrap(points)))
+
     def refitted(self, vertices: Floats) -> CpuTracer:
         """A tracer of moved vertices, as many as before."""
         return CpuTracer(self.bvh.refitted(vertices), self._faces, self.backend, self.geoms)
@@ -149,6 +160,16 @@ class CpuTracer:
         arrays = rays.numpy(self._real)
         near = moved(rays, arrays, self._real, self._ball, work.threads)
         return (arrays, None) if near is None else (near.arrays, near)
+
+
+class _Wrap:
+    """NumPy's arrays (n,...) as those of the points' library, in their shape."""
+
+    def __init__(self, points: Points) -> None:
+        self._library, self._shaped = points.library, points.shaped()
+
+    def __call__(self, array: NDArray[Any]) -> Any:
+        return self._shaped(self._library.from_numpy(array))
 
 
 def _wrapping(rays: Rays) -> Wrapping:

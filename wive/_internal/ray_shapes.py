@@ -25,7 +25,7 @@ def flat_rays(rays: Rays) -> tuple[Rays, Shape]:
     numbers or of that leading shape.
     """
     given = list(zip(NAMES, rays[:4], rays.libraries, strict=True))
-    arrays = [_array(*one) for one in given]
+    arrays = [numeric_array(*one) for one in given]
     shapes = [shape_of(name, array, library) for (name, _, library), array in zip(given, arrays, strict=True)]
     leading = _leading_of(NAMES[:2], shapes[:2], "rays")
     for name, shape in zip(NAMES[2:], shapes[2:], strict=True):
@@ -34,7 +34,7 @@ def flat_rays(rays: Rays) -> tuple[Rays, Shape]:
                 f"{name} must be one number or have shape {leading}, one per ray, got shape {shape}"
             )
     origins, directions, tmin, tmax = (
-        _flattened(array, library, shape, tail)
+        flattened(array, library, shape, tail)
         for array, library, shape, tail in zip(arrays, rays.libraries, shapes, OF_ONE_RAY, strict=True)
     )
     return Rays(origins, directions, tmin, tmax, rays.library, rays.libraries), leading
@@ -44,9 +44,9 @@ def flat_ends(a: Any, b: Any) -> tuple[Any, Any, Shape | None]:
     """Ends of segments in NumPy's arrays as (n,3), or (3,) for all, and their leading shape; None if flat."""
     if not (has_many_axes(a, NUMPY) or has_many_axes(b, NUMPY)):
         return a, b, None
-    first, second = _array("a", a, NUMPY), _array("b", b, NUMPY)
+    first, second = numeric_array("a", a, NUMPY), numeric_array("b", b, NUMPY)
     leading = _leading_of(("a", "b"), (np.shape(first), np.shape(second)), "segments")
-    one, other = (_flattened(end, NUMPY, np.shape(end), (3,)) for end in (first, second))
+    one, other = (flattened(end, NUMPY, np.shape(end), (3,)) for end in (first, second))
     return one, other, leading
 
 
@@ -57,25 +57,25 @@ def flat_places(prim: Any, uv: Any, directions: Any) -> tuple[Any, Any, Any, Sha
     """
     if not has_many_axes([prim], NUMPY):
         return prim, uv, directions, None
-    prims = _array("prim", prim, NUMPY)
+    prims = numeric_array("prim", prim, NUMPY)
     leading = np.shape(prims)
     rows = []
     for name, value, tail in (("uv", uv, (2,)), ("directions", directions, (3,))):
-        array = _array(name, value, NUMPY)
+        array = numeric_array(name, value, NUMPY)
         shape, expected = np.shape(array), (*leading, *tail)
         if shape not in (tail, expected):
             raise ValueError(f"{name} must have shape {expected}, one row per prim, or {tail}, got {shape}")
-        rows.append(_flattened(array, NUMPY, shape, tail))
-    return _flattened(prims, NUMPY, leading, ()), rows[0], rows[1], leading
+        rows.append(flattened(array, NUMPY, shape, tail))
+    return flattened(prims, NUMPY, leading, ()), rows[0], rows[1], leading
 
 
 def flat_directions(value: Any, library: Library, leading: Shape) -> Any:
     """Directions (*leading, 3) as (n,3); (3,) stays. Raises ValueError for any other shape."""
-    array = _array("directions", value, library)
+    array = numeric_array("directions", value, library)
     shape = shape_of("directions", array, library)
     if shape not in ((3,), (*leading, 3)):
         raise ValueError(f"directions must have shape {(*leading, 3)}, one per hit, or (3,), got {shape}")
-    return _flattened(array, library, shape, (3,))
+    return flattened(array, library, shape, (3,))
 
 
 def _leading_of(names: Sequence[str], shapes: Sequence[Shape], what: str) -> Shape:
@@ -92,16 +92,19 @@ def _leading_of(names: Sequence[str], shapes: Sequence[Shape], what: str) -> Sha
     return max(one, other, key=len)[:-1]
 
 
-def _array(name: str, value: Any, library: Library) -> Any:
+def numeric_array(name: str, value: Any, library: Library) -> Any:
     """The array; lists and the like as NumPy's."""
     if library is not NUMPY or isinstance(value, np.ndarray | float | int | np.generic):
         return value
     return arguments.array_of_numbers(name, value)
 
 
-def _flattened(array: Any, library: Library, shape: Shape, tail: Shape) -> Any:
-    """The array with one axis in place of the leading ones; what all rays share stays."""
-    if shape == tail:
+def flattened(array: Any, library: Library, shape: Shape, tail: Shape, at_least_one: bool = False) -> Any:
+    """The array with one axis in place of the leading ones; what all rays share stays.
+
+    `at_least_one`: a single row is shared by none, and gets an axis as well.
+    """
+    if shape == tail and not at_least_one:
         return array
     if library is NUMPY and not array.flags.c_contiguous:
         expect_room(array.size, array.dtype)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -103,8 +104,8 @@ def check_rays(
                 "convert one of them"
             )
     for name, value, other in foreign:
-        _check_place(name, place_of(name, other, value), backend, device)
-    return Rays(*values, _answering(libraries, library), libraries, _are_flat(values, libraries))
+        check_place(name, place_of(name, other, value), backend, device)
+    return Rays(*values, answering(libraries, library), libraries, _are_flat(values, libraries))
 
 
 def _are_flat(values: tuple[Any, ...], libraries: Libraries) -> bool:
@@ -116,7 +117,7 @@ def _is_shared(value: Any) -> bool:
     return np.ndim(value) == 0 or np.shape(value) == (3,)
 
 
-def _check_place(name: str, place: str | None, backend: str, device: str | None) -> None:
+def check_place(name: str, place: str | None, backend: str, device: str | None) -> None:
     if lies_on(place, device or "cpu"):
         return
     found = place or "a CUDA device"
@@ -131,7 +132,7 @@ def _check_place(name: str, place: str | None, backend: str, device: str | None)
     )
 
 
-def _answering(libraries: Libraries, first: Library) -> Library:
+def answering(libraries: Sequence[Library], first: Library) -> Library:
     """The library of the answer: among Warp arrays, the one whose arrays hold vectors."""
     for library in libraries[:2]:
         if isinstance(library, WarpArrays) and library.vectors:

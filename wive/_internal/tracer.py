@@ -8,11 +8,13 @@ from typing import TYPE_CHECKING, Any, Protocol
 from wive import _cpu
 from wive._internal.arguments import Work
 from wive._internal.picture import Image, Look
+from wive._internal.points import Points
 from wive._internal.precision import Floats
 from wive._internal.rays import Rays
 
 if TYPE_CHECKING:
     from wive.all_hits import AllHits
+    from wive.closest import Closest
     from wive.geoms import Geoms
     from wive.hits import Hits, Stats
     from wive.warp_kernels import Tree
@@ -63,6 +65,9 @@ class Tracer(Protocol):
 
     def intersect_all(self, rays: Rays, work: Work) -> tuple[AllHits, Stats | None]:
         """All hits."""
+
+    def closest(self, points: Points, work: Work) -> Closest:
+        """The surface's closest points."""
 
     def refitted(self, vertices: Floats) -> Tracer:
         """A tracer of moved vertices, as many as before."""

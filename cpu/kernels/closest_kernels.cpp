@@ -1,0 +1,43 @@
+#include "kernels/closest_kernels.h"
+
+#include <algorithm>
+
+#include "core/parallel.h"
+
+namespace wive {
+namespace {
+
+// Points that a thread takes at a time.
+constexpr std::size_t points_per_run = 256;
+
+}  // namespace
+
+template <class Real>
+const ClosestKernels<Real>* find_closest_kernels(IsaName isa) {
+    if (isa == IsaName::scalar) return closest_kernels<IsaName::scalar, Real>();
+#if defined(WIVE_X86_64)
+    return isa == IsaName::avx2 ? closest_kernels<IsaName::avx2, Real>() : closest_kernels<IsaName::avx512, Real>();
+#else
+    return nullptr;
+#endif
+}
+
+template const ClosestKernels<float>* find_closest_kernels(IsaName);
+template const ClosestKernels<double>* find_closest_kernels(IsaName);
+
+template <class Real>
+void find_closest_points(FindClosest<Real> kernel, const BvhView& bvh, const PointBatch<Real>& points,
+                         const ClosestBatch<Real>& out, std::size_t count, unsigned threads) {
+    std::size_t next = 0;
+    const RaySource source = {&next, count, points_per_run};
+    const std::size_t runs = (count + points_per_run - 1) / points_per_run;
+    const unsigned workers = runs <= 1 ? 1 : static_cast<unsigned>(std::min<std::size_t>(runs, thread_count(threads)));
+    parallel_for(workers, workers, [&](std::size_t) { kernel(bvh, points, out, source); });
+}
+
+template void find_closest_points(FindClosest<float>, const BvhView&, const PointBatch<float>&,
+                                  const ClosestBatch<float>&, std::size_t, unsigned);
+template void find_closest_points(FindClosest<double>, const BvhView&, const PointBatch<double>&,
+                                  const ClosestBatch<double>&, std::size_t, unsigned);
+
+}  // namespace wive
