@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from wive._internal import arguments
 from wive._internal.arguments import AccuracyOption, NodesOption, QualityOption
-from wive._internal.inside import contains, counts_by_place
+from wive._internal.inside import closedness, contains, passes_of
 from wive._internal.mesh_rays import MeshRays, mesh_class, rays_of, set_rays
 from wive._internal.placed_mesh import Float64, Found, Int64, PlacedMesh
 from wive._internal.precision import FLOAT64, Floats, real_asked
@@ -158,9 +158,10 @@ class RayMeshIntersector:
         """
         places = _rows("points", points)
         placed = self._place()
-        if placed.by_place is None:
-            placed.by_place = counts_by_place(placed, self._threads)
-        return contains(placed, places, placed.by_place, self._threads)
+        if placed.closedness is None:
+            placed.closedness = closedness(placed, self._threads)
+        closed, by_place = placed.closedness
+        return contains(placed.bounds, places, passes_of(placed, by_place, self._threads), closed)
 
     def _hit_places(
         self, placed: PlacedMesh, origins: Float64, directions: Float64, most: int | None

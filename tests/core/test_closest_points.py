@@ -1,179 +1,177 @@
-"""`Scene.closest`: shapes, libraries, and what is refused."""
+"""Closest points: the same bits whatever computes them, and against brute force on meshes of some size."""
 
-import copy
-import pickle
+from collections.abc import Callable, Iterator
 
 import numpy as np
 import pytest
-from support.foreign_arrays import Foreign
-from support.meshes import sphere
+from support.meshes import soup, sphere
 
 import wive
 
-COUNT = 24
-SHAPES = [(6, 4), (2, 3, 4), (1, 24), (1, 1, 24)]
+Mesh = tuple[np.ndarray, np.ndarray]
 
 
-def scene_of(dtype=np.float32, **options) -> wive.Scene:
-    vertices, faces = sphere(2)
-    return wive.Scene(vertices.astype(dtype), faces, **options)
+def brute_force(vertices: np.ndarray, faces: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """(n,) distances in float64, from every point to every triangle."""
+    a, b, c = vertices.astype(np.float64)[faces].swapaxes(0, 1)
+    normal = np.cross(b - a, c - a)
+    area = (normal**2).sum(axis=1)
+    a, b, c, normal, area = (x[area > 0] for x in (a, b, c, normal, area))
+    answer = []
+    for p in points.astype(np.float64):
+        squares = []
+        inside = area > 0
+        for one, other in ((a, b), (b, c), (c, a)):
+            side, to = other - one, p - one
+            along = np.clip((to * side).sum(axis=1) / (side**2).sum(axis=1), 0, 1)
+            squares.append(((to - along[:, None] * side) ** 2).sum(axis=1))
+            inside &= (normal * np.cross(side, to)).sum(axis=1) > 0
+        squares.append(np.where(inside, (normal * (p - a)).sum(axis=1) ** 2 / area, np.inf))
+        answer.append(np.sqrt(np.min(squares)))
+    return np.array(answer)
 
 
-def points_of(dtype=np.float32) -> np.ndarray:
-    return np.random.default_rng(4).uniform(-2, 2, (COUNT, 3)).astype(dtype)
+def mixed_points(random: np.random.Generator, mesh: Mesh, count: int) -> np.ndarray:
+    """Around the mesh, on it, beside it, and far away."""
+    vertices, faces = mesh
+    low, high = vertices.min(axis=0), vertices.max(axis=0)
+    corners = vertices[faces[random.integers(len(faces), size=count)]].astype(np.float64)
+    surface = (corners * random.dirichlet((1, 1, 1), count)[..., None]).sum(axis=1)
+    kinds = [
+        low + (high - low) * random.uniform(-0.5, 1.5, (count, 3)),
+        surface,
+        surface + 1e-3 * (high - low) * random.standard_normal((count, 3)),
+        corners[:, 0],
+        1e6 * (high - low).max() * random.standard_normal((count, 3)),
+    ]
+    return np.concatenate(kinds)
+
+
+@pytest.fixture(scope="module")
+def ball() -> Mesh:
+    return sphere(4)
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
-@pytest.mark.parametrize("shape", SHAPES)
-def test_answers_have_the_points_leading_shape(backend, shape, dtype):
-    scene, points = scene_of(dtype, backend=backend), points_of(dtype)
-    most = np.linspace(0, 1, COUNT).astype(dtype)
-    flat = scene.closest(points, most)
-    assert 0 < np.count_nonzero(flat.mask) < COUNT
-    shaped = scene.closest(points.reshape(*shape, 3), most.reshape(shape))
-    assert len(shaped) == shape[0]
-    for name, tail in {
-        "distance": (),
-        "prim": (),
-        "uv": (2,),
-        "mask": (),
-        "geom": (),
-        "geom_prim": (),
-    }.items():
-        values = getattr(shaped, name)
-        assert values.shape == (*shape, *tail)
-        np.testing.assert_array_equal(values.reshape(-1, *tail), getattr(flat, name))
-    for name in ("points", "normals"):
-        values = getattr(shaped, name)()
-        assert values.shape == (*shape, 3) and values.dtype == np.float64
-        np.testing.assert_array_equal(values.reshape(-1, 3), getattr(flat, name)())
-    heights = scene.vertices[:, 2]
-    np.testing.assert_array_equal(shaped.interpolate(heights).ravel(), flat.interpolate(heights))
-    assert flat.distance.dtype == flat.uv.dtype == dtype and flat.prim.dtype == np.int32
+@pytest.mark.parametrize("accuracy", ["watertight", "fast"])
+def test_distances_are_those_of_brute_force(ball: Mesh, accuracy: str, dtype: type) -> None:
+    for mesh in (ball, soup(3000, 4, 0.05)):
+        vertices, faces = mesh[0].astype(dtype), mesh[1]
+        points = mixed_points(np.random.default_rng(5), mesh, 20).astype(dtype)
+        found = wive.Scene(vertices, faces, accuracy=accuracy).closest(points)
+        expected = brute_force(vertices, faces, points)
+        error = 2.0**-24 if accuracy == "fast" and dtype == np.float32 else 2.0**-45
+        np.testing.assert_allclose(found.distance, expected, rtol=np.finfo(dtype).eps, atol=4 * error)
 
 
-def test_one_point_is_a_batch_of_one(backend):
-    found = scene_of(backend=backend).closest([0, 0, 3])
-    assert found.distance.shape == (1,) and found.points().shape == (1, 3)
-    np.testing.assert_array_equal(found.points(), [[0, 0, 1]])
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@pytest.mark.parametrize("accuracy", ["watertight", "fast"])
+def test_bits_depend_on_nothing_but_mesh_and_point(
+    ball: Mesh, backend: str, accuracy: str, dtype: type
+) -> None:
+    random = np.random.default_rng(7)
+    for mesh in (ball, soup(2000, 9)):
+        vertices, faces = mesh[0].astype(dtype), mesh[1]
+        points = mixed_points(random, mesh, 200).astype(dtype)
+        first = wive.Scene(vertices, faces, accuracy=accuracy, backend="scalar").closest(points, threads=1)
+        for found, rows in variants(vertices, faces, points, accuracy, backend, random):
+            np.testing.assert_array_equal(found.distance, first.distance[rows])
+            np.testing.assert_array_equal(found.prim, first.prim[rows])
+            np.testing.assert_array_equal(found.uv, first.uv[rows])
 
 
-def test_a_closest_point_lies_where_its_distance_says(backend):
-    points = points_of()
-    found = scene_of(backend=backend).closest(points)
-    np.testing.assert_allclose(
-        np.linalg.norm(found.points() - points, axis=1), found.distance, rtol=1e-6, atol=1e-6
-    )
-    outside = np.linalg.norm(points, axis=1) > 1.1
-    assert ((found.normals() * (points - found.points())).sum(axis=1)[outside] > 0).all()
+def variants(
+    vertices: np.ndarray,
+    faces: np.ndarray,
+    points: np.ndarray,
+    accuracy: str,
+    backend: str,
+    random: np.random.Generator,
+) -> Iterator[tuple[wive.Closest, np.ndarray]]:
+    threads: list[int | None] = [None] if backend == "warp" else [1, 2]
+    for nodes in ("float32", "compressed"):
+        for quality in ("medium",) if backend == "warp" else ("medium", "high"):
+            options = {"accuracy": accuracy, "nodes": nodes, "quality": quality, "backend": backend}
+            scene = wive.Scene(vertices, faces, **options)
+            for count in threads:
+                rows = random.permutation(len(points))
+                yield scene.closest(points[rows], threads=count), rows
+            for one in random.integers(len(points), size=5):
+                yield scene.closest(points[one][None]), np.array([one])
 
 
-def test_results_are_copied_and_pickled_whole_and_never_set(cpu_backend):
-    scene = scene_of(backend=cpu_backend)
-    for points in (points_of(), points_of().reshape(6, 4, 3)):
-        found = scene.closest(points)
-        for other in (pickle.loads(pickle.dumps(found)), copy.deepcopy(found)):
-            np.testing.assert_array_equal(other.distance, found.distance)
-            np.testing.assert_array_equal(other.points(), found.points())
-    with pytest.raises(AttributeError, match=r"Closest\.distance can't be set"):
-        scene.closest(points_of()).distance = 0
+def test_exact_scenes_have_the_bits_of_watertight_ones(ball: Mesh, backend: str) -> None:
+    points = mixed_points(np.random.default_rng(3), ball, 100).astype(np.float32)
+    found = [
+        wive.Scene(*ball, accuracy=name, backend=backend).closest(points) for name in ("exact", "watertight")
+    ]
+    for name in ("distance", "prim", "uv"):
+        np.testing.assert_array_equal(*(getattr(one, name) for one in found))
 
 
-def test_what_it_shows_says_how_many_and_where():
-    scene = scene_of()
-    assert repr(scene.closest(points_of(), 0.3)).startswith("Closest(24 points, ")
-    assert repr(scene.closest(points_of().reshape(6, 4, 3))) == "Closest((6, 4) points, in arrays of numpy)"
+def test_a_largest_distance_leaves_out_what_is_farther_and_nothing_else(ball: Mesh, backend: str) -> None:
+    points = mixed_points(np.random.default_rng(8), ball, 200)
+    for dtype in (np.float32, np.float64):
+        scene = wive.Scene(ball[0].astype(dtype), ball[1], backend=backend)
+        every = scene.closest(points.astype(dtype))
+        for most in (every.distance, np.nextafter(every.distance, dtype(0)), dtype(0.1), dtype(0)):
+            some = scene.closest(points.astype(dtype), most)
+            inside = every.distance <= most
+            np.testing.assert_array_equal(some.distance, np.where(inside, every.distance, np.inf))
+            np.testing.assert_array_equal(some.prim, np.where(inside, every.prim, -1))
+            np.testing.assert_array_equal(np.isnan(some.uv).all(axis=1), ~inside)
 
 
-def test_arrays_of_another_library_come_back_as_that(cpu_backend):
-    scene, points = scene_of(backend=cpu_backend), points_of()
-    flat = scene.closest(points)
-    foreign = scene.closest(Foreign.Array(points))
-    assert isinstance(foreign.distance, Foreign.Array)
-    np.testing.assert_array_equal(foreign.distance.values, flat.distance)
-    np.testing.assert_array_equal(foreign.points().values, flat.points())
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_points_that_are_no_numbers_or_out_of_range_are_close_to_nothing(backend: str, dtype: type) -> None:
+    scene = wive.Scene(sphere(1)[0].astype(dtype), sphere(1)[1], backend=backend)
+    bad = np.array([[np.nan, 0, 0], [0, np.inf, 0], [0, 0, -np.inf], [1.1e18, 0, 0]], dtype)
+    points = np.concatenate([bad, np.zeros((20, 3), dtype), bad])
+    found = scene.closest(points)
+    assert np.isinf(found.distance[[*range(4), *range(24, 28)]]).all()
+    assert (found.prim[[*range(4), *range(24, 28)]] == -1).all()
+    assert (found.prim[4:24] >= 0).all()
 
 
-def test_vectors_of_warp_come_back_as_vectors(device):
-    wp = pytest.importorskip("warp")
-    scene = scene_of()
-    found = scene.closest(wp.array(points_of(), dtype=wp.vec3, device="cpu"))
-    assert found.uv.dtype == wp.vec2 and found.points().dtype == wp.vec3d
-    np.testing.assert_array_equal(found.distance.numpy(), scene.closest(points_of()).distance)
-
-
-def test_several_meshes_are_told_apart(backend):
+@pytest.mark.parametrize("scale", [1e-38, 1e-30, 1e-6, 1e6, 1e17])
+def test_meshes_of_every_size_have_the_same_answers(backend: str, scale: float) -> None:
+    power = np.float32(2.0 ** round(np.log2(scale)))
     vertices, faces = sphere(2)
-    scene = wive.Scene.from_meshes(
-        [(vertices, faces), (vertices + np.float32([5, 0, 0]), faces)], backend=backend
+    points = mixed_points(np.random.default_rng(1), (vertices, faces), 50)[:200].astype(np.float32)
+    kept = (abs(points * power) <= 1e18).all(axis=1)
+    one = wive.Scene(vertices.astype(np.float64), faces, backend=backend).closest(points[kept])
+    other = wive.Scene(vertices.astype(np.float64) * power, faces, backend=backend).closest(
+        points[kept].astype(np.float64) * power
     )
-    found = scene.closest([[-2, 0, 0], [7, 0, 0], [np.nan, 0, 0]])
-    assert found.geom.tolist() == [0, 1, -1]
-    assert found.geom_prim[1] == found.prim[1] - len(faces)
+    np.testing.assert_array_equal(one.prim, other.prim)
+    np.testing.assert_array_equal(one.uv, other.uv)
+    np.testing.assert_array_equal(one.distance * power, other.distance)
 
 
-def test_numbers_that_are_masked_are_close_to_nothing(backend):
-    points = np.ma.masked_array(points_of(), mask=False)
-    points[3, 1] = np.ma.masked
-    found = scene_of(backend=backend).closest(points)
-    assert np.flatnonzero(found.prim < 0).tolist() == [3]
+def test_an_empty_scene_is_close_to_nothing(backend: str) -> None:
+    scene = wive.Scene(np.zeros((0, 3), np.float32), np.zeros((0, 3), np.int32), backend=backend)
+    assert scene.closest(np.zeros((3, 3))).prim.tolist() == [-1, -1, -1]
+    assert len(scene.closest(np.zeros((0, 3)))) == 0
 
 
-def test_points_are_not_copied_if_they_need_not_be(cpu_backend):
-    points = points_of()
-    points.flags.writeable = False
-    scene_of(backend=cpu_backend).closest(points)
-    strided = np.zeros((COUNT, 6), np.float32)
-    strided[:, ::2] = points
-    for same in (np.asfortranarray(points), strided[:, ::2], points.astype(np.float64), points.tolist()):
-        np.testing.assert_array_equal(
-            scene_of(backend=cpu_backend).closest(same).distance,
-            scene_of(backend=cpu_backend).closest(points).distance,
-        )
+def test_large_scenes_agree_between_backends(scenes: Callable[[str], Mesh], cpu_backend: str) -> None:
+    mesh = scenes("living_room")
+    points = mixed_points(np.random.default_rng(2), mesh, 1000).astype(np.float32)
+    first = wive.Scene(*mesh, backend="scalar").closest(points)
+    found = wive.Scene(*mesh, backend=cpu_backend, nodes="compressed").closest(points)
+    np.testing.assert_array_equal(found.distance, first.distance)
+    np.testing.assert_array_equal(found.prim, first.prim)
+    np.testing.assert_array_equal(found.uv, first.uv)
+    np.testing.assert_allclose(
+        found.distance[::900], brute_force(*mesh, points[::900]), rtol=2.0**-23, atol=2.0**-40
+    )
 
 
-REFUSED = {
-    "flat": ((np.zeros(4),), "points must have shape (..., 3), one point per row, got (4,)"),
-    "columns": ((np.zeros((2, 4)),), "points must have shape (..., 3), one point per row, got (2, 4)"),
-    "number": ((3.0,), "points must have shape (..., 3), one point per row, got ()"),
-    "text": (("abc",), "points must be an array of real numbers, got dtype <U3"),
-    "complex": (
-        (np.zeros((2, 3), complex),),
-        "points must be an (n, 3) array of real numbers, got dtype complex128",
-    ),
-    "ragged": (([[1, 2, 3], [1, 2]],), "points must be an array of real numbers, got rows of unequal length"),
-    "negative": ((np.zeros((2, 3)), -1), "max_distance must be 0 or more, np.inf for no limit, got -1.0"),
-    "NaN": ((np.zeros((2, 3)), np.nan), "max_distance must be 0 or more, np.inf for no limit, got nan"),
-    "one negative": (
-        (np.zeros((2, 3)), [1, -2]),
-        "max_distance must be 0 or more, np.inf for no limit, got max_distance[1] = -2.0",
-    ),
-    "too many": (
-        (np.zeros((2, 3)), np.ones(3)),
-        "max_distance must be one number or have shape (2,), one per point, got shape (3,)",
-    ),
-    "other shape": (
-        (np.zeros((2, 2, 3)), np.ones(4)),
-        "max_distance must be one number or have shape (2, 2), one per point, got shape (4,)",
-    ),
-    "none": ((np.zeros((2, 3)), None), "max_distance must be a real number or one per point, got NoneType"),
-}
-
-
-@pytest.mark.parametrize("name", REFUSED)
-def test_what_is_no_point_or_distance_is_refused_in_one_line(backend, name):
-    given, expected = REFUSED[name]
-    with pytest.raises((ValueError, TypeError)) as caught:
-        scene_of(backend=backend).closest(*given)
-    text = str(caught.value)
-    assert text.startswith(expected) and "\n" not in text, text
-
-
-def test_threads_are_for_cpu_backends(backend):
-    scene = scene_of(backend=backend)
-    if backend == "warp":
-        with pytest.raises(ValueError, match="threads is only for CPU backends"):
-            scene.closest(points_of(), threads=2)
-    else:
-        with pytest.raises(ValueError, match="threads must be from 1"):
-            scene.closest(points_of(), threads=0)
+def test_after_a_refit_closest_points_are_those_of_the_new_positions(backend: str) -> None:
+    vertices, faces = sphere(2)
+    scene = wive.Scene(vertices, faces, backend=backend)
+    points = np.random.default_rng(1).standard_normal((100, 3)).astype(np.float32)
+    scene.refit(vertices * np.float32([1, 2, 3]))
+    fresh = wive.Scene(vertices * np.float32([1, 2, 3]), faces, backend=backend)
+    np.testing.assert_array_equal(scene.closest(points).distance, fresh.closest(points).distance)
+    np.testing.assert_array_equal(scene.closest(points).prim, fresh.closest(points).prim)

@@ -97,6 +97,11 @@ class RayLoader:
             largest_distances(points.max_distance, 1, self.numbers)
         return rows, self._limit("max_distance", points.max_distance, points.libraries[1], len(rows))
 
+    def rays_along(self, origins: Any, direction: Floats) -> tuple[Any, Any, Any, Any]:
+        """Origins (n,) vec3, one direction for all of them, and limits: from 0 on."""
+        one = wp.full(1, self._vec3(*direction.tolist()), dtype=self._vec3, device=self.device)
+        return origins, _view(one, len(origins), 0), *self._common.values()
+
     def directions(self, value: Any, count: int) -> Any:
         """(count,) vec3 of directions (count,3), or (3,) for all; NumPy's are copied to the device."""
         library = library_of(value)

@@ -14,6 +14,8 @@ from wive import _cpu
 from wive._internal.arguments import Lanes, Work
 from wive._internal.arrays import NUMPY
 from wive._internal.distant import Ball, Moved, moved
+from wive._internal.inside import DIRECTIONS
+from wive._internal.inside_scene import SignOption, closed_scene, inside_of, signed_distances
 from wive._internal.picture import Image, Look
 from wive._internal.points import Points
 from wive._internal.precision import Floats, real_of
@@ -35,8 +37,10 @@ from wive.warp_kernels import (
 from wive.warp_kernels.lanes.lanes import expected_lanes
 from wive.warp_kernels.lanes.precision import PRECISIONS
 from wive.warp_kernels.scene.hits import WarpAllHits, WarpClosest, WarpHits
+from wive.warp_kernels.scene.inside import negate, odd
 from wive.warp_kernels.scene.memory import expect_hits_fit, memory_errors
 from wive.warp_kernels.scene.rays import RayLoader, WarpRays
+from wive.warp_kernels.tree.quiet import launch
 from wive.warp_kernels.tree.tree import check_memory
 
 # For fewer rays eight threads per ray keep a GPU busy and return sooner; for more, one thread per ray traces
@@ -187,7 +191,40 @@ class WarpTracer:
             closest = Closest(*found, self.vertices, self.faces, self.geoms)
             if points.leading is None:
                 return closest
-            return WrappedClosest(closest, Wrapping(library, self.device, points.shaped()))
+            return WrappedClosest(closest, Wrapping(library, self.device, points.answer))
+
+    def inside(self, points: Points, sign: SignOption, work: Work) -> Any:
+        """(n,) bool, whether each point is inside; of arrays on the device one ray decides."""
+        if points.library is NUMPY or sign == "winding":
+            return points.answer(inside_of(self, self.faces, points, sign, work))
+        with points.library.on_stream(self.device), memory_errors():
+            rows, _ = self.loader.points(points)
+            return _FromWarp(points)(self._inside(rows))
+
+    def signed_distance(self, points: Points, sign: SignOption, work: Work) -> Any:
+        """(n,) distances, negative inside."""
+        if points.library is NUMPY or sign == "winding":
+            return points.answer(signed_distances(self, self.faces, points, sign, work))
+        with points.library.on_stream(self.device), memory_errors():
+            rows, most = self.loader.points(points)
+            distance, prim, uv = self._outputs(len(rows))
+            launch_closest_points(self.tree, rows, most, distance, prim, uv)
+            launch(negate, len(rows), [self._inside(rows)], [distance], device=self.device, record_tape=False)
+            return _FromWarp(points)(distance)
+
+    @functools.cached_property
+    def closed(self) -> bool:
+        """Whether every edge is in an even number of triangles."""
+        return closed_scene(self, self.faces)
+
+    def _inside(self, rows: Any) -> Any:
+        """(n,) bool of points (n,) vec3: whether a ray crosses the surface an odd number of times."""
+        counts = wp.empty(len(rows), dtype=wp.int32, device=self.device)
+        inside = wp.empty(len(rows), dtype=wp.bool, device=self.device)
+        lanes = choose_lanes(None, len(rows), self.device != "cpu")
+        launch_count(self.tree, *self.loader.rays_along(rows, DIRECTIONS[0]), counts, lanes=lanes)
+        launch(odd, len(rows), [counts], [inside], device=self.device, record_tape=False)
+        return inside
 
     def refitted(self, vertices: Floats) -> WarpTracer:
         """A tracer of moved vertices, as many as before."""

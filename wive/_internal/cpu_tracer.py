@@ -13,6 +13,7 @@ from wive import _cpu
 from wive._internal.arguments import Work
 from wive._internal.arrays import NUMPY
 from wive._internal.distant import Ball, Moved, Traced, moved
+from wive._internal.inside_scene import SignOption, closed_scene, inside_of, signed_distances
 from wive._internal.picture import Image, Look
 from wive._internal.points import Points
 from wive._internal.precision import Floats, real_of
@@ -119,7 +120,20 @@ class CpuTracer:
         closest = Closest(*found, self._vertices, self._faces, self.geoms)
         if points.library is NUMPY and points.leading is None:
             return closest
-        return WrappedClosest(closest, Wrapping(points.library, "cpu", _Wrap(points)))
+        return WrappedClosest(closest, Wrapping(points.library, "cpu", points.answer))
+
+    def inside(self, points: Points, sign: SignOption, work: Work) -> Any:
+        """(n,) bool, whether each point is inside."""
+        return points.answer(inside_of(self, self._faces, points, sign, work))
+
+    def signed_distance(self, points: Points, sign: SignOption, work: Work) -> Any:
+        """(n,) distances, negative inside."""
+        return points.answer(signed_distances(self, self._faces, points, sign, work))
+
+    @functools.cached_property
+    def closed(self) -> bool:
+        """Whether every edge is in an even number of triangles."""
+        return closed_scene(self, self._faces)
 
     def refitted(self, vertices: Floats) -> CpuTracer:
         """A tracer of moved vertices, as many as before."""
@@ -160,16 +174,6 @@ class CpuTracer:
         arrays = rays.numpy(self._real)
         near = moved(rays, arrays, self._real, self._ball, work.threads)
         return (arrays, None) if near is None else (near.arrays, near)
-
-
-class _Wrap:
-    """NumPy's arrays (n,...) as those of the points' library, in their shape."""
-
-    def __init__(self, points: Points) -> None:
-        self._library, self._shaped = points.library, points.shaped()
-
-    def __call__(self, array: NDArray[Any]) -> Any:
-        return self._shaped(self._library.from_numpy(array))
 
 
 def _wrapping(rays: Rays) -> Wrapping:

@@ -1,17 +1,24 @@
 """Which points are inside a mesh: rays from there pass its surface an odd number of times.
 
-In a closed mesh each edge is in two triangles, and crossings are counted. In a mesh whose faces are stored
-twice, as two-sided exports are, each place has two crossings, and places are counted, whether both copies
-have the same triangles or not. Two boxes that share a wall also have two triangles in one place; there,
-crossings are counted.
+In a closed mesh each edge is in an even number of triangles, crossings are counted, and any ray decides. Of
+other meshes a ray and its opposite have to agree. In a mesh whose faces are stored twice, as two-sided
+exports are, each place has two crossings, and `wive.trimesh` counts places, whether both copies have the same
+triangles or not. Two boxes that share a wall also have two triangles in one place; there, crossings are
+counted.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
-from wive._internal.placed_mesh import Float64, Int64, PlacedMesh
+from wive._internal.precision import Floats
+
+if TYPE_CHECKING:
+    from wive._internal.placed_mesh import PlacedMesh
 
 # Directions of rays, tried until a ray and its opposite agree; the first is trimesh's.
 DIRECTIONS = np.array(
@@ -29,57 +36,86 @@ SAMPLES = 64
 # The sine between planes that are one plane.
 ONE_PLANE = 1e-6
 
+Float64 = NDArray[np.float64]
+Int64 = NDArray[np.int64]
 Uint64 = NDArray[np.uint64]
+Mask = NDArray[np.bool_]
+# For points and a direction: how many crossings or places each ray passes, and whether that is sure.
+Passes = Callable[[Any, Float64], tuple[NDArray[Any], Mask | None]]
 
 
-def contains(placed: PlacedMesh, points: Float64, by_place: bool, threads: int | None) -> NDArray[np.bool_]:
-    """(n,) bool: whether each point (n,3) is inside.
+class Closedness(NamedTuple):
+    """What is known of a mesh from its edges."""
 
-    `by_place`: whether each place of the surface counts once, however many triangles are there.
-    """
+    closed: bool  # every edge is in an even number of triangles: the number of crossings decides
+    by_place: bool  # faces are stored more than once, or there is an open edge: places count
+
+
+def contains(bounds: NDArray[Any], points: NDArray[Any], passes: Passes, closed: bool) -> Mask:
+    """(n,) bool: whether each point (n,3) is inside; `closed`: one ray decides."""
     contained = np.zeros(len(points), np.bool_)
-    low, high = placed.bounds
+    low, high = bounds
     (asked,) = np.nonzero(((points >= low) & (points <= high)).all(axis=1))
-    passes = _places_passed if by_place else _crossings
     for direction in DIRECTIONS:
-        there, sure_there = passes(placed, points[asked], direction, threads)
-        back, sure_back = passes(placed, points[asked], -direction, threads)
+        there, sure_there = passes(points[asked], direction)
+        odd = there % 2 == 1
+        contained[asked] = odd
+        if closed:
+            break
         # A ray that meets nothing proves that the point is outside, whatever the other ray meets.
-        free = (there == 0) | (back == 0)
-        agreed = (there % 2 == back % 2) & sure_there & sure_back
-        contained[asked] = (there % 2 == 1) & ~free
-        asked = asked[~agreed & ~free]
+        (met,) = np.nonzero(there != 0)
+        back, sure_back = passes(points[asked[met]], -direction)
+        free, agreed = back == 0, odd[met] == (back % 2 == 1)
+        for sure in (None if sure_there is None else sure_there[met], sure_back):
+            if sure is not None:
+                agreed &= sure
+        contained[asked[met[free]]] = False
+        asked = asked[met[~agreed & ~free]]
         if len(asked) == 0:
             break
     return contained
 
 
-def counts_by_place(placed: PlacedMesh, threads: int | None) -> bool:
-    """Whether `contains` counts places: if faces are stored more than once, or the mesh has an open edge."""
+def is_closed(vertices: Floats, faces: NDArray[np.int32]) -> bool:
+    """Whether every edge is in an even number of triangles, by the positions of vertices."""
+    corners = _position_keys(vertices.astype(np.float64, copy=False))[faces]
+    is_triangle = (corners != np.roll(corners, 1, axis=1)).all()
+    return bool(is_triangle and (_edge_degrees(corners) % 2 == 0).all())
+
+
+def closedness(placed: PlacedMesh, threads: int | None) -> Closedness:
+    """What the edges say of a mesh of trimesh."""
     corners = _position_keys(placed.vertices)[placed.scene.faces]
     is_triangle = (corners != np.roll(corners, 1, axis=1)).all(axis=1)
-    corners = corners[is_triangle]
+    whole, corners = bool(is_triangle.all()), corners[is_triangle]
     if len(corners) == 0:
-        return False
+        return Closedness(closed=False, by_place=False)
     degrees = _edge_degrees(corners)
     if (degrees != 2).any():
         _, first = np.unique(_mixed(corners).sum(axis=1, dtype=np.uint64), return_index=True)
         if len(first) < len(corners) and (_edge_degrees(corners[first]) % 2 == 0).all():
-            return True
-    return bool((degrees % 2).any()) or _is_doubled_throughout(placed, threads)
+            return Closedness(closed=False, by_place=True)
+    odd = bool((degrees % 2).any())
+    by_place = odd or _is_doubled_throughout(placed, threads)
+    return Closedness(whole and not by_place and placed.scene.accuracy != "fast", by_place)
 
 
-def _crossings(
-    placed: PlacedMesh, points: Float64, direction: Float64, threads: int | None
-) -> tuple[Int64, NDArray[np.bool_]]:
-    rays = placed.rays(points, np.broadcast_to(direction, points.shape))
-    counts = placed.scene.count(*rays, threads=threads).astype(np.int64)
-    return counts, np.ones(len(points), np.bool_)
+def passes_of(placed: PlacedMesh, by_place: bool, threads: int | None) -> Passes:
+    """How often rays pass a mesh of trimesh; `by_place`: places, however many triangles are there."""
+
+    def crossings(points: Float64, direction: Float64) -> tuple[NDArray[Any], Mask | None]:
+        rays = placed.rays(points, np.broadcast_to(direction, points.shape))
+        return placed.scene.count(*rays, threads=threads), None
+
+    def places(points: Float64, direction: Float64) -> tuple[NDArray[Any], Mask | None]:
+        return _places_passed(placed, points, direction, threads)
+
+    return places if by_place else crossings
 
 
 def _places_passed(
     placed: PlacedMesh, points: Float64, direction: Float64, threads: int | None
-) -> tuple[Int64, NDArray[np.bool_]]:
+) -> tuple[Int64, Mask]:
     """How many places each ray passes, and whether that is sure: at an edge it passes several planes."""
     directions = np.tile(direction, (len(points), 1))
     found, again = placed.every_hit(points, directions, threads)

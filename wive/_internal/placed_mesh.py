@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from wive import _cpu
 from wive._internal.distant import Ball
+from wive._internal.inside import Closedness
 from wive._internal.precision import Floats, Real
 from wive.scene import Scene
 
@@ -71,7 +72,7 @@ class PlacedMesh:
             power = max(-MOST_POWER, min(-round(np.log2(self.size)), MOST_POWER))
         self._scale = 2.0**power if scale_to_box else 1.0
         self._unit = 2.0**power if abs(power) > PLAIN_POWER else 1.0
-        self.by_place: bool | None = None  # what `inside.counts_by_place` says, when asked
+        self.closedness: Closedness | None = None  # what `inside.closedness` says, when asked
         self._real = real
         self._ball = Ball.around(self.bounds)
         self.scene = Scene(real.array((self.vertices - self._origin) * self._scale), faces, **options)

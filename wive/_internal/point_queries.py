@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from wive._internal import arguments
-from wive._internal.points import check_points
+from wive._internal.arguments import Work
+from wive._internal.inside_scene import SIGNS, SignOption
+from wive._internal.points import Points, check_points
+from wive._internal.precision import Floats
 from wive._internal.tracer import Tracer
 from wive.closest import Closest
 
@@ -41,5 +44,53 @@ class PointQueries:
         >>> closest.distance, closest.prim, closest.points()
         """
         tracer = self._tracer
-        work = arguments.work(tracer.backend, tracer.lacks, threads, None, "auto", False)
+        work = _work(tracer, threads)
         return tracer.closest(check_points(points, max_distance, tracer.backend, tracer.device), work)
+
+    def contains(
+        self, points: ArrayLike, *, sign: SignOption = "crossings", threads: int | None = None
+    ) -> NDArray[np.bool_]:
+        """(n,) bool: whether each point is inside the mesh.
+
+        Arguments:
+            points: as for `closest`.
+            sign: "crossings" for closed meshes: a point is inside if a ray from there crosses the surface an
+                odd number of times, which is decided without error at edges and vertices, too; where meshes
+                overlap, an even number of them is outside. "winding" for meshes with holes, gaps and
+                overlaps: inside if the mesh winds round the point more than half, by the generalised winding
+                number (Barill and others 2018, to 0.03). Triangles must be wound alike then; computed on
+                the host; the first call makes a table over the tree.
+            threads: how many to use; None is every core. For CPU backends.
+
+        A point on the surface may be inside or not; one that is NaN, infinite or masked is not. If a mesh
+        is not closed, several rays have to agree, except for arrays on a Warp device, where one decides.
+
+        Raises ValueError or TypeError, in one line naming the argument.
+        """
+        tracer, work = self._tracer, _work(self._tracer, threads)
+        arguments.choice("sign", sign, SIGNS)
+        inside: NDArray[np.bool_] = tracer.inside(_checked(tracer, points), sign, work)
+        return inside
+
+    def signed_distance(
+        self, points: ArrayLike, *, sign: SignOption = "crossings", threads: int | None = None
+    ) -> Floats:
+        """(n,) the distance of each point to the surface, negative inside; inf for a point that is NaN.
+
+        Arguments are those of `contains`, which decides the sign; the distance is that of `closest`. In
+        trimesh it is positive inside, and `wive.trimesh` follows that.
+
+        >>> grown = scene.signed_distance(points) < 0.1
+        """
+        tracer, work = self._tracer, _work(self._tracer, threads)
+        arguments.choice("sign", sign, SIGNS)
+        distance: Floats = tracer.signed_distance(_checked(tracer, points), sign, work)
+        return distance
+
+
+def _work(tracer: Tracer, threads: int | None) -> Work:
+    return arguments.work(tracer.backend, tracer.lacks, threads, None, "auto", False)
+
+
+def _checked(tracer: Tracer, points: ArrayLike) -> Points:
+    return check_points(points, np.inf, tracer.backend, tracer.device)

@@ -38,6 +38,15 @@ class Points(NamedTuple):
         rows = arguments.vectors("points", points, real, may_be_one=False)
         return rows, largest_distances(most, len(rows), real)
 
+    def on_host(self, real: Real) -> Points:
+        """The same points as (n,3) of NumPy."""
+        rows, most = self.numpy(real)
+        return Points(rows, most if len(most) > 1 else float(most[0]), NUMPY, (NUMPY, NUMPY), None)
+
+    def answer(self, array: Any) -> Any:
+        """NumPy's array (n,...) as one of the points' library, in their shape."""
+        return self.shaped()(self.library.from_numpy(array))
+
     def shaped(self) -> Callable[[Any], Any]:
         """A function that gives the library's arrays (n,...) the points' leading shape."""
         return _same if self.leading is None else Leading(self.library, self.leading)

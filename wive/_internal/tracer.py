@@ -13,6 +13,7 @@ from wive._internal.precision import Floats
 from wive._internal.rays import Rays
 
 if TYPE_CHECKING:
+    from wive._internal.inside_scene import SignOption
     from wive.all_hits import AllHits
     from wive.closest import Closest
     from wive.geoms import Geoms
@@ -48,6 +49,10 @@ class Tracer(Protocol):
         """The meshes that the scene was made of; None if it is one."""
 
     @property
+    def closed(self) -> bool:
+        """Whether every edge is in an even number of triangles."""
+
+    @property
     def tree(self) -> Tree:
         """The tree on the Warp device; ValueError for CPU backends."""
 
@@ -68,6 +73,12 @@ class Tracer(Protocol):
 
     def closest(self, points: Points, work: Work) -> Closest:
         """The surface's closest points."""
+
+    def inside(self, points: Points, sign: SignOption, work: Work) -> Any:
+        """(n,) bool, whether each point is inside; in the points' library and shape."""
+
+    def signed_distance(self, points: Points, sign: SignOption, work: Work) -> Any:
+        """(n,) distances, negative inside; in the points' library and shape."""
 
     def refitted(self, vertices: Floats) -> Tracer:
         """A tracer of moved vertices, as many as before."""
