@@ -70,7 +70,7 @@ public:
         const double most = (static_cast<double>(most_) + std::numeric_limits<Real>::denorm_min()) *
                             (1 + 4 * static_cast<double>(std::numeric_limits<Real>::epsilon()));
         best_ = most * most;
-        boxes_.load(bvh, position);
+        boxes_.load(bvh, point_);
         limit_ = boxes_.limit(best_);
         if (block_ != nullptr) test(*block_);  // where the last point was close to: a bound, if not the answer
         top_ = Stack::Top(stack_);

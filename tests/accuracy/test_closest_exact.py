@@ -53,6 +53,7 @@ def sets() -> dict[str, tuple[np.ndarray, np.ndarray, np.ndarray]]:
         "needles": (needles.reshape(-1, 3), separate(40), around),
         "small integers": (*integers, few_bits(random, COUNT, 5)),
         "in UTM coordinates": (ball * 50 + place, ball_faces, around * 60 + place),
+        "caps from far away": (caps.reshape(-1, 3), separate(40), around * np.float32(1e5)),
         "far away": (ball, ball_faces, around * np.float32(1e6)),
         "tiny": (ball * np.float32(1e-12), ball_faces, around * np.float32(1e-12)),
         "huge": (ball * np.float32(1e15), ball_faces, around * np.float32(1e15)),

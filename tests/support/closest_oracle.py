@@ -59,5 +59,5 @@ def error_bounds(
     longest = np.max([np.linalg.norm(x - y, axis=1) for x, y in ((a, b), (b, c), (c, a))], axis=0)
     with np.errstate(divide="ignore"):
         thinness = longest**2 / np.linalg.norm(np.cross(b - a, c - a), axis=1)
-    relative = np.minimum(2.0**-46 * thinness, 2.0**-23)
-    return relative[prim] * (distance.astype(np.float64) + longest[prim])
+    far, size = distance.astype(np.float64), longest[prim]
+    return np.minimum(2.0**-46 * thinness[prim] * (far + size), 2.0**-23 * size + 2.0**-50 * far)

@@ -21,13 +21,14 @@ from wive.warp_kernels.tree.handle import CORRUPT, HANDLES
 from wive.warp_kernels.tree.nodes import NODES
 from wive.warp_kernels.triangles.distance import closest_weights, squared_distance
 
-MAX_FLOAT = wp.constant(wp.float64(3.4028234663852886e38))
+MOST = wp.constant(wp.float64(2.0**16))
+ROUNDING = wp.constant(wp.float64(2.0**-44))
 TWICE_ONE = wp.constant(wp.uint32(254))  # exponent fields of a number and of its scale add up to this
 MANTISSA = wp.constant(wp.uint32(23))
 # Factors by which a limit is larger than what is compared once rounded, and boxes' limits than that.
 MARGIN = {"float32": 1 + 4 * 2.0**-23, "float64": 1 + 4 * 2.0**-52}
 LEAST = {"float32": 2.0**-149, "float64": 2.0**-1074}
-BOX_MARGIN = wp.constant(wp.float64(1 + 2.0**-22))
+BOX_MARGIN = wp.constant(wp.float64(2.0**-22))
 
 
 @wp.struct
@@ -52,33 +53,46 @@ class Located:
 
 @wp.struct
 class PointFrame:
-    """A point made ready for tests of boxes; cpu/traverse/point_boxes.h derives its bounds."""
+    """A point made ready for tests of boxes; cpu/traverse/point_boxes.h explains and derives bounds."""
 
     low_bias: wp.vec3
     high_bias: wp.vec3
+    beyond: wp.vec3
     scale: wp.float32
+    beyond_squared: wp.float64
 
 
 @wp.func
-def _frame(relative: wp.vec3, extent: float) -> PointFrame:
+def _frame(relative: wp.vec3d, extent: wp.vec3) -> PointFrame:
     frame = PointFrame()
-    size = wp.max(wp.abs(relative))
-    magnitude = size + extent + LEAST_MAGNITUDE
+    nearest = wp.vec3()
+    away = wp.vec3d()
+    magnitude = float(0.0)
+    for axis in range(3):
+        reach = wp.float64(extent[axis])
+        nearest[axis] = wp.float32(wp.clamp(relative[axis], -reach, reach))
+        away[axis] = wp.max(wp.abs(relative[axis]) - reach, wp.float64(0.0))
+        magnitude = wp.max(magnitude, extent[axis] + wp.float32(away[axis]))
+    size = wp.max(wp.abs(nearest))
+    magnitude = magnitude + size + LEAST_MAGNITUDE
     frame.scale = wp.cast((TWICE_ONE - (wp.cast(magnitude, wp.uint32) >> MANTISSA)) << MANTISSA, wp.float32)
+    frame.beyond_squared = wp.dot(away, away)
     slack = size * frame.scale * SLACK_FACTOR
     for axis in range(3):
-        frame.low_bias[axis] = -(relative[axis] * frame.scale + slack)
-        frame.high_bias[axis] = relative[axis] * frame.scale - slack
+        frame.low_bias[axis] = -(nearest[axis] * frame.scale + slack)
+        frame.high_bias[axis] = nearest[axis] * frame.scale - slack
+        frame.beyond[axis] = wp.float32(away[axis] * wp.float64(frame.scale))
     return frame
 
 
 @wp.func
 def _box_limit(frame: PointFrame, squared: wp.float64) -> float:
     scale = wp.float64(frame.scale)
-    scaled = squared * scale * scale * BOX_MARGIN
-    if scaled < MAX_FLOAT:
-        return wp.float32(scaled) + SUBNORMAL_STEP
-    return wp.float32(MAX_FLOAT)
+    rest = squared * (wp.float64(1.0) + ROUNDING) - frame.beyond_squared * (wp.float64(1.0) - ROUNDING)
+    scaled = rest * scale * scale
+    if scaled < MOST:
+        return wp.float32(scaled + wp.abs(scaled) * BOX_MARGIN) + SUBNORMAL_STEP
+    return wp.float32(MOST)
 
 
 @functools.cache
@@ -132,11 +146,8 @@ def make_closest_point(accuracy: str, stack_size: int, nodes: str, precision: st
             low = distances(units, begin, 0, axis, 2 * axis, frame.scale, frame.low_bias[axis])
             high = distances(units, begin, 0, axis, 2 * axis + 1, -frame.scale, frame.high_bias[axis])
             for i in range(8):
-                gap = wp.max(wp.max(low[i], high[i]), 0.0)
-                if axis == 0:
-                    squared[i] = gap * gap
-                else:
-                    squared[i] = squared[i] + gap * gap
+                gap = wp.max(wp.max(low[i], high[i]), -frame.beyond[axis])
+                squared[i] = squared[i] + gap * (gap + 2.0 * frame.beyond[axis])
         count = int(0)
         nearest = int(0)
         least_squared = float(wp.inf)
@@ -190,12 +201,8 @@ def make_closest_point(accuracy: str, stack_size: int, nodes: str, precision: st
         if not valid:
             return located
         point = wp.vec3d(wp.float64(given[0]), wp.float64(given[1]), wp.float64(given[2]))
-        relative = wp.vec3(
-            wp.float32(given[0] - real(tree.center[0])),
-            wp.float32(given[1] - real(tree.center[1])),
-            wp.float32(given[2] - real(tree.center[2])),
-        )
-        frame = _frame(relative, tree.extent)
+        center = wp.vec3d(wp.float64(tree.center[0]), wp.float64(tree.center[1]), wp.float64(tree.center[2]))
+        frame = _frame(point - center, tree.extent)
         best = Nearest()
         reach = (wp.float64(most) + wp.static(least)) * wp.static(margin)
         best.squared = reach * reach

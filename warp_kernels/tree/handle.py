@@ -28,7 +28,7 @@ class Bvh:
     units: wp.array(dtype=wp.float32)  # nodes, then triangle blocks
     error: wp.array(dtype=wp.int32)  # two words, CORRUPTION and REFUSAL
     center: wp.vec3
-    extent: wp.float32  # the largest |coordinate - center|
+    extent: wp.vec3  # the largest |coordinate - center| on each axis
     step_limit: wp.int32  # no traversal of a sound tree takes more steps
     stack: wp.int32  # stack size that a traversal may need
     kind: wp.int32  # index into KINDS: a handle of another type has another

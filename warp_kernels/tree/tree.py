@@ -95,7 +95,7 @@ def upload(bvh: _cpu.Bvh, device: wp.DeviceLike = None) -> Tree:
     handle.units = units
     handle.error = error
     handle.center = wp.vec3(*bvh.center.tolist())
-    handle.extent = float(bvh.extent.max())
+    handle.extent = wp.vec3(*bvh.extent.tolist())
     compressed, double = bvh.node_form == "compressed", bvh.precision == "float64"
     # A traversal meets no node and no leaf twice.
     node_words = COMPRESSED_NODE_WORDS if compressed else NODE_WORDS

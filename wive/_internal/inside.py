@@ -40,7 +40,7 @@ Float64 = NDArray[np.float64]
 Int64 = NDArray[np.int64]
 Uint64 = NDArray[np.uint64]
 Mask = NDArray[np.bool_]
-# For points and a direction: how many crossings or places each ray passes, and whether that is sure.
+# For points and a direction, or one each: how many crossings or places rays pass, and whether that is sure.
 Passes = Callable[[Any, Float64], tuple[NDArray[Any], Mask | None]]
 
 
@@ -55,13 +55,20 @@ def contains(bounds: NDArray[Any], points: NDArray[Any], passes: Passes, closed:
     """(n,) bool: whether each point (n,3) is inside; `closed`: one ray decides."""
     contained = np.zeros(len(points), np.bool_)
     low, high = bounds
-    (asked,) = np.nonzero(((points >= low) & (points <= high)).all(axis=1))
+    within = points[:, 0] >= low[0]
+    for axis in range(3):
+        within &= (points[:, axis] >= low[axis]) & (points[:, axis] <= high[axis])
+    (asked,) = np.nonzero(within)
+    if len(asked) == 0:
+        return contained
+    if closed:
+        some = points if len(asked) == len(points) else points[asked]
+        contained[asked] = passes(some, _shortest_ways(some, low, high))[0] & 1
+        return contained
     for direction in DIRECTIONS:
         there, sure_there = passes(points[asked], direction)
         odd = there % 2 == 1
         contained[asked] = odd
-        if closed:
-            break
         # A ray that meets nothing proves that the point is outside, whatever the other ray meets.
         (met,) = np.nonzero(there != 0)
         back, sure_back = passes(points[asked[met]], -direction)
@@ -74,6 +81,14 @@ def contains(bounds: NDArray[Any], points: NDArray[Any], passes: Passes, closed:
         if len(asked) == 0:
             break
     return contained
+
+
+def _shortest_ways(points: NDArray[Any], low: NDArray[Any], high: NDArray[Any]) -> NDArray[Any]:
+    """(n,3) directions out of the box along its shortest side, to the nearer end: past fewer triangles."""
+    axis = int(np.argmin(high - low))
+    ways = np.zeros_like(points)
+    ways[:, axis] = np.where(points[:, axis] > low[axis] + (high[axis] - low[axis]) / 2, 1, -1)
+    return ways
 
 
 def is_closed(vertices: Floats, faces: NDArray[np.int32]) -> bool:

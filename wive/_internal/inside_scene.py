@@ -33,8 +33,8 @@ def inside_of(tracer: Tracer, faces: NDArray[np.int32], points: Points, sign: Si
         return np.asarray(np.abs(bvh.winding(rows, work.threads)) > INSIDE)
 
     def passes(some: NDArray[Any], direction: NDArray[np.float64]) -> tuple[NDArray[Any], None]:
-        way = np.broadcast_to(direction.astype(some.dtype), some.shape)
-        return tracer.count(rays_of_numpy(some, np.ascontiguousarray(way), 0.0, np.inf), work)[0], None
+        ways = np.ascontiguousarray(np.broadcast_to(direction.astype(some.dtype, copy=False), some.shape))
+        return tracer.count(rays_of_numpy(some, ways, 0.0, np.inf), work)[0], None
 
     closed = len(rows) > WORTH_KNOWING * len(faces) and bvh.accuracy != "fast" and tracer.closed
     return contains(bvh.bounds, rows, passes, closed)
