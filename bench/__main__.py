@@ -8,6 +8,7 @@ from pathlib import Path
 MODULES = {"convert": "support.convert_scene", "gpu": "gpu.run", "gpu-prepare": "gpu.prepare"}
 BENCHES = {
     "build": "build time, SAH cost and memory against native Embree, 100 thousand to 20 million triangles",
+    "closest": "closest points and insides against Open3D and trimesh, one core",
     "cliffs": "inputs on which the cost of a ray could jump, over usual ones",
     "embree": "single rays against native Embree: speed, build time, SAH, memory",
     "gpu": "wive's Warp kernels on a GPU: the core's bits, speed against Warp's own query, streams",

@@ -32,10 +32,11 @@ from wive.warp_kernels.launching.launch import (
     launch_count,
     scan_counts,
 )
-from wive.warp_kernels.tree.handle import Bvh, Bvh64, ExactBvh, FastBvh, FastBvh64, Hit, Hit64
+from wive.warp_kernels.tree.handle import Bvh, Bvh64, ClosestPoint, ExactBvh, FastBvh, FastBvh64, Hit, Hit64
 from wive.warp_kernels.tree.tree import CorruptTreeError, Tree, check, upload
 
 if TYPE_CHECKING:
+    from wive.warp_kernels.functions.closest_point import closest_point
     from wive.warp_kernels.functions.functions import any_hit, closest_hit, count_hits
     from wive.warp_kernels.functions.gradients import SurfaceHit, SurfaceHit64, differentiable_hit
 
@@ -43,6 +44,7 @@ __all__ = [
     "MOST_HITS",
     "Bvh",
     "Bvh64",
+    "ClosestPoint",
     "CorruptTreeError",
     "ExactBvh",
     "FastBvh",
@@ -55,6 +57,7 @@ __all__ = [
     "any_hit",
     "check",
     "closest_hit",
+    "closest_point",
     "count_hits",
     "differentiable_hit",
     "launch_all",
@@ -68,12 +71,15 @@ __all__ = [
 
 # The functions for users' kernels are made when first used: they take a tenth of a second or more.
 _FUNCTIONS = {"any_hit", "closest_hit", "count_hits"}
+_POINTS = {"closest_point"}
 _GRADIENTS = {"SurfaceHit", "SurfaceHit64", "differentiable_hit"}
 
 
 def __getattr__(name: str) -> Any:
     if name in _FUNCTIONS:
         from wive.warp_kernels.functions import functions as made_by
+    elif name in _POINTS:
+        from wive.warp_kernels.functions import closest_point as made_by
     elif name in _GRADIENTS:
         from wive.warp_kernels.functions import gradients as made_by
     else:

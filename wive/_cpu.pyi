@@ -264,6 +264,15 @@ class Bvh:
         to the sun, radiance of a white surface that faces the sun; None is a white sky of radiance 1.
         """
 
+def closest_on(
+    vertices: NDArray[np.float64],
+    faces: NDArray[np.int32],
+    prim: NDArray[np.int32],
+    points: NDArray[np.float64],
+    threads: int = 0,
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """(n,3) the closest point of triangle prim[i] to points[i], (n,) distances; NaN, inf without one."""
+
 def surface_points(
     vertices: NDArray[Real], faces: NDArray[np.int32], prim: NDArray[np.int32], uv: NDArray[Real]
 ) -> NDArray[np.float64]:

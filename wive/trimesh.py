@@ -163,6 +163,16 @@ class RayMeshIntersector:
         closed, by_place = placed.closedness
         return contains(placed.bounds, places, passes_of(placed, by_place, self._threads), closed)
 
+    def closest_point(self, points: ArrayLike) -> tuple[Float64, Float64, Int64]:
+        """The closest point of the mesh to each point (n,3), as `trimesh.proximity.closest_point` returns it.
+
+        Returns (n,3) float64 points, (n,) float64 distances and (n,) int64 rows of `mesh.faces`: computed in
+        float64 for the triangle that is closest in the scene's precision. A point that is NaN or infinite
+        has NaN, inf and -1.
+        """
+        places = _rows("points", points)
+        return self._place().closest_points(places, self._threads)
+
     def _hit_places(
         self, placed: PlacedMesh, origins: Float64, directions: Float64, most: int | None
     ) -> Found:
@@ -220,7 +230,9 @@ class IntersectorOptions(TypedDict, total=False):
 
 
 def install(**options: Unpack[IntersectorOptions]) -> None:
-    """Use wive for the rays and the `contains` of every trimesh mesh in this process.
+    """Use wive for rays, `contains` and closest points of every trimesh mesh in this process.
+
+    What trimesh computes with these uses it: `mesh.nearest`, signed distance, thickness and reach.
 
     Also of meshes that exist already, and of every mesh to come: copies, submeshes, sums, primitives, loaded
     and unpickled ones. Whether embreex is installed makes no difference. `mesh.ray` is then a

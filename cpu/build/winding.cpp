@@ -12,8 +12,8 @@ namespace {
 using Vector = std::array<double, 3>;
 
 constexpr std::size_t points_per_chunk = 256;
-// A child is looked at as a whole from this many of its radii away. The expansion has two terms; what it leaves out, and
-// with it the error, is less than 0.03 (tests/accuracy/test_winding.py).
+// A child is looked at as a whole from this many of its radii away. The expansion has two terms; what it leaves out,
+// and with it the error, is less than 0.03 (tests/accuracy/test_winding.py).
 constexpr double far_radii = 3;
 
 double dot(const Vector& a, const Vector& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }

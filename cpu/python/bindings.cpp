@@ -277,7 +277,7 @@ PYBIND11_MODULE(_cpu, m, pybind11::mod_gil_not_used()) {
              py::arg("threads") = 0, py::arg("in_flight") = 0, py::arg("tracer") = py::none(), py::arg("check") = true,
              py::arg("colours").noconvert() = py::none(), py::arg("light").noconvert() = py::none());
     bind_queries(bvh);
-    bind_closest(bvh);
+    bind_closest(m, bvh);
     bind_surface(m);
     bind_spawn(m);
     bind_segments(m);

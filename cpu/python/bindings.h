@@ -182,7 +182,7 @@ using PyBvhClass = py::class_<PyBvh>;
 // Defined in bindings_queries.cpp: ray queries. In bindings_surface.cpp: points and normals of hits. In
 // bindings_closest.cpp: closest points. In bindings_spawn.cpp: spawned rays. In bindings_segments.cpp: line of sight.
 void bind_queries(PyBvhClass& bvh);
-void bind_closest(PyBvhClass& bvh);
+void bind_closest(py::module_& m, PyBvhClass& bvh);
 void bind_surface(py::module_& m);
 void bind_spawn(py::module_& m);
 void bind_segments(py::module_& m);

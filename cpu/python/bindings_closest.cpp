@@ -1,10 +1,20 @@
 // Closest points of the surface, as Python calls them.
+#include <cmath>
+#include <limits>
+
 #include "core/memory.h"
 #include "kernels/closest_kernels.h"
 #include "python/bindings.h"
+#include "python/each_hit.h"
 
 namespace wive {
 namespace {
+
+// clang-format off
+#include "core/number.inc"
+#include "core/double3.inc"
+#include "core/triangle_distance.inc"
+// clang-format on
 
 IsaName isa_of(const KernelArg& kernel) {
     if (const auto* handle = std::get_if<const PyKernels*>(&kernel)) {
@@ -53,9 +63,37 @@ Array<double> winding(const PyBvh& self, const Array<Real>& points, unsigned thr
     return answer;
 }
 
+// The closest point (n,3) on triangle prim[i] to each point, and its distance; NaN and infinity if there is none.
+py::tuple closest_on(const Array<double>& vertices, const Array<std::int32_t>& faces, const Array<std::int32_t>& prim,
+                     const Array<double>& points, unsigned threads) {
+    expect_rows(points, 3, prim, "points: expected shape (n, 3), n as prim has");
+    auto closest = make_rows<double>(prim.size());
+    auto distance = new_array<double>({prim.size()});
+    double *to = closest.mutable_data(), *far = distance.mutable_data();
+    const double* from = points.data();
+    const auto measure = [=](std::size_t i, TriangleCorners corner) {
+        if (!corner) {
+            std::fill_n(to + 3 * i, 3, std::numeric_limits<double>::quiet_NaN());
+            far[i] = std::numeric_limits<double>::infinity();
+            return;
+        }
+        const Double3 v0 = Double3::load(corner[0]), v1 = Double3::load(corner[1]), v2 = Double3::load(corner[2]);
+        TriangleDistance found;
+        found.measure(v0, v1, v2, Double3::load(from + 3 * i));
+        double uv[2];
+        found.weights(uv);
+        (v0 * (1 - uv[0] - uv[1]) + v1 * uv[0] + v2 * uv[1]).store(to + 3 * i);
+        far[i] = std::sqrt(found.squared());
+    };
+    for_each_hit(vertices, faces, prim, measure, threads);
+    return py::make_tuple(std::move(closest), std::move(distance));
+}
+
 }  // namespace
 
-void bind_closest(PyBvhClass& bvh) {
+void bind_closest(py::module_& m, PyBvhClass& bvh) {
+    m.def("closest_on", &closest_on, array_arg("vertices"), array_arg("faces"), array_arg("prim"), array_arg("points"),
+          py::arg("threads") = 0);
     for_each_precision([&]<class Real>(Real) {
         bvh.def("closest", &closest<Real>, py::arg("kernel"), array_arg("points"), array_arg("max_distance"),
                 py::arg("threads") = 0);

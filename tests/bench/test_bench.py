@@ -53,6 +53,13 @@ def test_bench_embree_finds_embrees_hits(bench: Callable[..., dict[str, Any]]) -
     assert content["trees"][0]["wive_sah"] > 0
 
 
+def test_bench_closest_compares_points_and_insides(bench: Callable[..., dict[str, Any]]) -> None:
+    content = bench("closest", "--scenes", SCENE)
+    assert {row["kind"] for row in content["rows"]} == {"volume", "surface"}
+    assert all(row["wive_ns"] > 0 for row in content["rows"])
+    assert content["contains"][0]["contains"] > 0
+
+
 def test_bench_paper_renders_embrees_picture(bench: Callable[..., dict[str, Any]]) -> None:
     content = bench("paper", "--scenes", SCENE)
     assert content["rows"]

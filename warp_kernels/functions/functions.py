@@ -18,7 +18,7 @@ from wive.warp_kernels.tree.handle import CORRUPTION, HANDLES, HITS, KINDS, REFU
 
 
 @wp.func
-def _refused(error: wp.array(dtype=wp.int32), kind: int, wanted: int):
+def refused(error: wp.array(dtype=wp.int32), kind: int, wanted: int):
     """Whether the tree can't be traversed here: it is of another kind, which is noted, or was overwritten."""
     if kind != wanted:
         error[REFUSAL] = 1
@@ -67,7 +67,7 @@ def make_functions(
         hit.prim = NO_PRIM
         hit.normal = vec3(real(wp.nan))
         ray = load_frame(bvh.center, origin, direction, tmin, tmax)
-        if ray.valid and not _refused(bvh.error, bvh.kind, wanted):
+        if ray.valid and not refused(bvh.error, bvh.kind, wanted):
             best = trace_closest(bvh, ray, 0, begin_closest(ray)).found
             if best.prim != NO_PRIM:
                 hit.t = distance(best, ray.unscale)
@@ -88,7 +88,7 @@ def make_functions(
         """
         ray = load_frame(bvh.center, origin, direction, tmin, tmax)
         hit = bool(False)
-        if ray.valid and not _refused(bvh.error, bvh.kind, wanted):
+        if ray.valid and not refused(bvh.error, bvh.kind, wanted):
             hit = trace_any(bvh, ray, 0, begin_any(ray)).found.prim != NO_PRIM
         return hit
 
@@ -100,7 +100,7 @@ def make_functions(
         """
         ray = load_frame(bvh.center, origin, direction, tmin, tmax)
         hits = int(0)
-        if ray.valid and not _refused(bvh.error, bvh.kind, wanted):
+        if ray.valid and not refused(bvh.error, bvh.kind, wanted):
             hits = trace_count(bvh, ray, 0, begin_count(ray)).found.count
         return hits
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+from wive._internal.mesh_points import set_closest_point
+
 # Of a mesh: what trimesh or the user set as its intersector, and the one that is used in its place.
 OWN, HELD = "ray", "_wive_ray"
 
@@ -81,7 +83,8 @@ def rays_of(kind: type) -> MeshRays | None:
 
 
 def set_rays(kind: Any, rays: MeshRays | None) -> None:
-    """Give a mesh class this property, or none."""
+    """Give a mesh class this property, or none; trimesh's closest points go with it."""
+    set_closest_point(rays is not None)
     if rays is not None:
         kind.ray = rays
     elif rays_of(kind) is not None:

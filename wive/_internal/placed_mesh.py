@@ -101,6 +101,17 @@ class PlacedMesh:
             vertices, origins = vertices * unit, origins * unit
         return _cpu.points_on_rays(vertices, faces, prim, uv, ray, origins, directions) / unit
 
+    def closest_points(self, points: Float64, threads: int | None) -> tuple[Float64, Float64, Int64]:
+        """(n,3) closest points, (n,) distances and (n,) triangles, in the mesh's own float64."""
+        rows, _ = self.rays(points, points)
+        prim = self.scene.closest(rows, threads=threads).prim
+        # The scene's vertices are rounded: where on the triangle is found again from the mesh's own.
+        vertices, unit = self.vertices, self._unit
+        with np.errstate(over="ignore"):
+            scaled = (vertices, points) if unit == 1 else (vertices * unit, points * unit)
+        closest, distance = _cpu.closest_on(scaled[0], self.scene.faces, prim, scaled[1])
+        return closest / unit, distance / unit, prim.astype(np.int64)
+
     def every_hit(
         self, origins: Float64, directions: Float64, threads: int | None
     ) -> tuple[Found, NDArray[np.bool_] | None]:

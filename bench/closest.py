@@ -1,0 +1,154 @@
+"""Closest points and insides, one core: wive against Open3D and trimesh, with the same points.
+
+Points lie evenly in the scene's box ("volume"), or a hundredth of its size off the surface ("surface").
+`open3d` and `trimesh` are their seconds over wive's, from NumPy arrays to NumPy arrays; a library that is not
+installed, or that can't be imported, has no column. trimesh gets a thousandth of the points. `contains` is
+trimesh's `mesh.contains` by embreex over `scene.contains`, for a closed mesh made of the scene's size.
+"""
+
+import argparse
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import matplotlib
+import numpy as np
+
+import wive
+from bench.support import report
+from bench.support.options import scene_parser
+from bench.support.scenes import SceneFolder
+from bench.support.timing import QUICK, Effort, compare, one_core, timed
+
+matplotlib.use("Agg")
+from matplotlib import pyplot
+from matplotlib.figure import Figure
+
+USUAL = ("living_room", "city_san_francisco", "terrain_jacksboro", "bmw_m6")
+QUICK_SCENES = ("terrain_2k",)
+KINDS = ("volume", "surface")
+OFF_SURFACE = 0.01  # of the scene's size
+COLUMNS = ["scene", "triangles", "kind", "wive_ns", "open3d", "trimesh"]
+CONTAINS = ["triangles", "points", "wive_seconds", "contains"]
+
+
+def main(options: Sequence[str]) -> None:
+    """Runs the bench with command-line options."""
+    chosen = parse_options(options)
+    scenes = SceneFolder(chosen.scene_dir).select(chosen.scenes, QUICK_SCENES if chosen.quick else USUAL)
+    effort = QUICK if chosen.quick else Effort(least=3, most=5)
+    count = 2_000 if chosen.quick else 50_000
+    rows: list[report.Row] = []
+    with one_core():
+        for name in scenes.names:
+            mesh = SceneFolder(chosen.scene_dir).load(name)
+            for kind in KINDS:
+                rows.append(row_of(name, mesh.vertices, mesh.faces, kind, count, effort))
+                report.print_progress(rows[-1], COLUMNS)
+        insides = [inside_row(3 if chosen.quick else 6, 20 * count, effort)]
+    report.print_table(rows, COLUMNS, "Closest points, one core: their seconds over wive's")
+    report.print_table(
+        insides, CONTAINS, "Points inside a closed mesh, one core: trimesh's seconds over wive's"
+    )
+    content = {"rows": rows, "contains": insides}
+    whole = scenes.whole and not chosen.quick
+    report.save("closest", content, draw(rows), chosen.out, whole=whole)
+
+
+def row_of(
+    name: str, vertices: np.ndarray, faces: np.ndarray, kind: str, count: int, effort: Effort
+) -> report.Row:
+    """One scene and kind of points."""
+    points = points_of(vertices, faces, kind, count)
+    scene = wive.Scene(vertices, faces)
+
+    def ours(some: np.ndarray) -> Callable[[], float]:
+        return timed(lambda: scene.closest(some, threads=1))
+
+    alone = min(ours(points)() for _ in range(3))
+    row: report.Row = {"scene": name, "triangles": len(faces), "kind": kind, "wive_ns": alone / count * 1e9}
+    few = points[:: max(1, count // 50)]
+    for library, make, some in (("open3d", open3d_query, points), ("trimesh", trimesh_query, few)):
+        theirs = make(vertices, faces, some)
+        if theirs is not None:
+            row[library] = compare(ours(some), timed(theirs), effort).ratio
+    return row
+
+
+def points_of(vertices: np.ndarray, faces: np.ndarray, kind: str, count: int) -> Any:
+    """(count,3) float32, always the same."""
+    random = np.random.default_rng(16)
+    low, high = vertices.min(axis=0), vertices.max(axis=0)
+    if kind == "volume":
+        return (low + (high - low) * random.random((count, 3))).astype(np.float32)
+    corners = vertices[faces[random.integers(len(faces), size=count)]]
+    places = (corners * random.dirichlet((1, 1, 1), count)[..., None]).sum(axis=1)
+    return (places + OFF_SURFACE * (high - low).max() * random.standard_normal((count, 3))).astype(np.float32)
+
+
+def open3d_query(vertices: np.ndarray, faces: np.ndarray, points: np.ndarray) -> Callable[[], Any] | None:
+    """Open3D's closest points on one thread; None without Open3D."""
+    try:
+        import open3d
+    except (ImportError, OSError):
+        return None
+    tensor = open3d.core.Tensor
+    scene = open3d.t.geometry.RaycastingScene(nthreads=1)
+    scene.add_triangles(tensor(vertices.astype(np.float32)), tensor(faces.astype(np.uint32)))
+    return lambda: scene.compute_closest_points(tensor(points), nthreads=1)["points"].numpy()
+
+
+def trimesh_query(vertices: np.ndarray, faces: np.ndarray, points: np.ndarray) -> Callable[[], Any] | None:
+    """trimesh's closest points; None without trimesh or the tree that it needs."""
+    try:
+        import trimesh
+
+        mesh = trimesh.Trimesh(vertices, faces, process=False)
+        query: Callable[..., Any] = trimesh.proximity.closest_point
+        query(mesh, points[:1])  # makes the tree
+    except ImportError:
+        return None
+    return lambda: query(mesh, points)
+
+
+def inside_row(level: int, count: int, effort: Effort) -> report.Row:
+    """Points inside a bumpy ball: trimesh with embreex against wive."""
+    import trimesh
+
+    ball = trimesh.creation.icosphere(subdivisions=level)
+    ball.vertices *= 1 + 0.1 * np.sin(8 * ball.vertices).prod(axis=1, keepdims=True)
+    scene = wive.Scene(ball.vertices.astype(np.float32), ball.faces)
+    points = np.random.default_rng(3).uniform(-1.1, 1.1, (count, 3))
+    ball.contains(points[:1])
+    found = compare(
+        timed(lambda: scene.contains(points, threads=1)), timed(lambda: ball.contains(points)), effort
+    )
+    return {
+        "triangles": len(ball.faces),
+        "points": count,
+        "wive_seconds": found.our_seconds,
+        "contains": found.ratio,
+    }
+
+
+def draw(rows: Sequence[report.Row]) -> Figure:
+    """Ratios by scene and kind of points."""
+    figure, axes = pyplot.subplots(figsize=(8, 4), layout="constrained")
+    labels = [f"{row['scene']}\n{row['kind']}" for row in rows]
+    for i, library in enumerate(("open3d", "trimesh")):
+        known = [(k, row[library]) for k, row in enumerate(rows) if row.get(library) is not None]
+        if known:
+            places, ratios = zip(*known, strict=True)
+            axes.bar(np.add(places, 0.35 * i - 0.2), ratios, width=0.33, label=library)
+    axes.axhline(1.0, color="0.4", linewidth=1)
+    axes.set_yscale("log")
+    axes.set_xticks(range(len(rows)), labels, fontsize=7)
+    axes.set_ylabel("their seconds over wive's")
+    axes.spines[["top", "right"]].set_visible(False)
+    if axes.get_legend_handles_labels()[0]:
+        axes.legend(frameon=False)
+    return figure
+
+
+def parse_options(options: Sequence[str]) -> argparse.Namespace:
+    """The command line's choices."""
+    return scene_parser("closest", __doc__).parse_args(options)
