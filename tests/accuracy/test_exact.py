@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from support.exact_answers import INFINITE, ZERO, truth_of, wrong_rays
 from support.hard_sets import SETS, HardSet, hard_set
-from support.oracle import Truth, integers, meetings, truth, unit_of
+from support.oracle import Truth, integers, meetings, truth, truth_within, unit_of
 
 import wive
 from wive import _cpu
@@ -95,9 +95,9 @@ def test_these_sets_can_tell_exact_from_rounded(accuracy: str) -> None:
         assert len(wrong_rays(found, truth_of(name))) > 0, name
 
 
-@pytest.mark.parametrize("name", ["small integers", "thin walls", "subnormal distances", "mixed exponents"])
-def test_limits_are_kept_to_exactly(backend: str, name: str) -> None:
-    """Limits at the reported t, which may be below, at or above the exact t, and at its neighbours."""
+@functools.cache
+def limited(name: str) -> tuple[HardSet, list[tuple[np.ndarray, np.ndarray, Truth]]]:
+    """Rays that hit; limits at the reported t and at its neighbours, and what is right within them."""
     first = truth_of(name)
     hit = np.flatnonzero(first.occluded)[:300]
     rays = hard_set(name)
@@ -105,9 +105,16 @@ def test_limits_are_kept_to_exactly(backend: str, name: str) -> None:
     at, everything = first.t[hit], np.full(len(hit), np.inf, np.float32)
     below, above = (np.nextafter(at, side * everything) for side in (-1, 1))
     cases = [(at, everything), (-everything, at), (at, at), (above, everything), (-everything, below)]
+    met = meetings(*rays)
+    return rays, [(tmin, tmax, truth_within(met, tmin, tmax)) for tmin, tmax in cases]
+
+
+@pytest.mark.parametrize("name", ["small integers", "thin walls", "subnormal distances", "mixed exponents"])
+def test_limits_are_kept_to_exactly(backend: str, name: str) -> None:
+    """Limits at the reported t, which may be below, at or above the exact t."""
+    rays, cases = limited(name)
     kept = []
-    for tmin, tmax in cases:
-        right = truth(*rays, tmin, tmax)
+    for tmin, tmax, right in cases:
         kept.append(right.occluded)
         assert len(wrong_rays(answers(backend, rays, tmin, tmax), right)) == 0
     assert 0 < np.mean(kept) < 1

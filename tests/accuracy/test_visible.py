@@ -1,5 +1,7 @@
 """`Scene.visible` is right for points in space and on surfaces, by fractions and by known shapes."""
 
+import functools
+
 import numpy as np
 import pytest
 from support.meshes import TRIANGLE, soup, sphere
@@ -14,16 +16,21 @@ SCENES = [("fast", np.float32), ("watertight", np.float32), ("exact", np.float32
           ("fast", np.float64), ("watertight", np.float64)]  # fmt: skip
 
 
+@functools.cache
+def segments_in_space(dtype: type) -> tuple[np.ndarray, ...]:
+    """Vertices, faces, both ends, and whether the segments are free."""
+    vertices, faces = soup(12, seed=1, size=0.6, dtype=dtype)
+    a, b = np.random.default_rng(2).uniform(-0.2, 1.2, (2, 60, 3)).astype(dtype)
+    return vertices, faces, a, b, free(vertices, faces, a, b, error_of(dtype))
+
+
 @pytest.mark.parametrize(("accuracy", "dtype"), SCENES)
 @pytest.mark.parametrize("nodes", ["float32", "compressed"])
 def test_segments_between_points_in_space_are_free_as_fractions_say(
     accuracy: str, dtype: type, nodes: str, backend: str
 ) -> None:
-    vertices, faces = soup(12, seed=1, size=0.6, dtype=dtype)
-    random = np.random.default_rng(2)
-    a, b = random.uniform(-0.2, 1.2, (2, 60, 3)).astype(dtype)
+    vertices, faces, a, b, expected = segments_in_space(dtype)
     scene = wive.Scene(vertices, faces, accuracy=accuracy, nodes=nodes, backend=backend)
-    expected = free(vertices, faces, a, b, error_of(dtype))
     assert 10 < expected.sum() < 50
     np.testing.assert_array_equal(scene.visible(a, b), expected)
 

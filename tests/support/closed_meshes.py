@@ -1,5 +1,7 @@
 """Closed meshes at any place and scale, rays that leave them at vertices and edges, and a terrain in UTM."""
 
+import functools
+
 import numpy as np
 
 from support.meshes import sphere
@@ -16,6 +18,12 @@ DIRECTIONS = np.array(
 
 def grid(size: int) -> tuple[np.ndarray, np.ndarray]:
     """A closed box [0, size]^3 whose six sides are integer grids of two triangles per cell."""
+    vertices, faces = _grid(size)
+    return vertices.copy(), faces.copy()
+
+
+@functools.cache
+def _grid(size: int) -> tuple[np.ndarray, np.ndarray]:
     corners: dict[tuple[int, int, int], int] = {}
     faces: list[list[int]] = []
 

@@ -78,8 +78,12 @@ def truth(
     tmax: np.ndarray,
 ) -> Truth:
     """The closest hit of each ray whose rounded t lies in [tmin, tmax], which are (1,) or (n,)."""
-    met = meetings(vertices, faces, origins, directions)
-    count = len(origins)
+    return truth_within(meetings(vertices, faces, origins, directions), tmin, tmax)
+
+
+def truth_within(met: Meetings, tmin: np.ndarray, tmax: np.ndarray) -> Truth:
+    """`truth` of rays that were met with triangles before."""
+    count = len(met.inside)
     tmin, tmax = np.broadcast_to(tmin, count), np.broadcast_to(tmax, count)
     t = np.full(count, np.inf, np.float32)
     uv = np.full((count, 2), np.nan, np.float32)
