@@ -17,7 +17,7 @@ from wive.warp_kernels.tree.tree import Tree
 @functools.cache
 def make_closest_kernel(accuracy: str, stack_size: int, nodes: str, precision: str) -> wp.Kernel:
     """The kernel, to be launched with dim (n,)."""
-    numbers, tree_type = PRECISIONS[precision], HANDLES[accuracy]
+    numbers, tree_type = PRECISIONS[precision], HANDLES[accuracy, precision]
     real, vec2, vec3 = numbers.real, numbers.vec2, numbers.vec3
     search = make_closest_point(accuracy, stack_size, nodes, precision)
 

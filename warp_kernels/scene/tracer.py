@@ -186,7 +186,7 @@ class WarpTracer:
             if library is not NUMPY:
                 home = WarpClosest(self, distance, prim, uv)
                 return WrappedClosest(home, Wrapping(library, self.device, _FromWarp(points)))
-            check(self.tree)
+            check_memory(self.tree)
             found = distance.numpy(), prim.numpy(), uv.numpy()
             closest = Closest(*found, self.vertices, self.faces, self.geoms)
             if points.leading is None:

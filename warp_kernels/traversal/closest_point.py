@@ -17,7 +17,7 @@ from wive.warp_kernels.lanes.layout import (
 from wive.warp_kernels.lanes.precision import PRECISIONS
 from wive.warp_kernels.queries.frame import LEAST_MAGNITUDE, MAX_COORDINATE, SLACK_FACTOR, SUBNORMAL_STEP
 from wive.warp_kernels.tree.blocks import block_form
-from wive.warp_kernels.tree.handle import CORRUPT, HANDLES
+from wive.warp_kernels.tree.handle import CORRUPTION, HANDLES
 from wive.warp_kernels.tree.nodes import NODES
 from wive.warp_kernels.triangles.distance import closest_weights, squared_distance
 
@@ -100,7 +100,7 @@ def make_closest_point(accuracy: str, stack_size: int, nodes: str, precision: st
     """The search for an accuracy, stack size, node form and precision: search(tree, point, most)."""
     lanes = lanes_of(8, 2 * stack_size, precision)
     blocks, node = block_form(lanes, nodes, precision), NODES[nodes](lanes)
-    numbers, tree_type = PRECISIONS[precision], HANDLES[accuracy]
+    numbers, tree_type = PRECISIONS[precision], HANDLES[accuracy, precision]
     real, vec3, load_number = numbers.real, numbers.vec3, numbers.load
     of_edges: bool = accuracy == "fast"
     node_words: int = node.words
@@ -224,7 +224,7 @@ def make_closest_point(accuracy: str, stack_size: int, nodes: str, precision: st
             end = wp.uint32(begin) + wp.uint32(wp.where(inner, node_words, block_count * block_words))
             steps += 1
             if steps > tree.step_limit or top > wp.static(stack_size - NODE_WIDTH) or end > all_words:
-                tree.error[0] = CORRUPT
+                tree.error[CORRUPTION] = 1
                 break
             if inner:
                 top += visit(units, begin, frame, limit, stack, top)
