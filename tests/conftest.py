@@ -6,7 +6,7 @@ device that can't be used ends the run with the reason. The default is Warp's CP
 
 import os
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -68,6 +68,8 @@ def backend(request: pytest.FixtureRequest) -> str:
     name: str = request.param
     if not BACKENDS[name].usable:
         pytest.skip(f"{name}: {BACKENDS[name].reason}")
+    if name == "warp":
+        request.getfixturevalue("one_stack_size")
     return name
 
 
@@ -80,10 +82,27 @@ def cpu_backend(backend: str) -> str:
 
 
 @pytest.fixture(scope="session")
-def device(pytestconfig: pytest.Config) -> str:
+def one_stack_size(pytestconfig: pytest.Config) -> Iterator[None]:
+    """On Warp's CPU device trees of any depth take kernels of the stack size of support/warp_launches.py.
+
+    Each kernel is then compiled once per run, which takes a second or two, not once per stack size.
+    """
+    from support.warp_launches import STACK
+
+    from wive.warp_kernels.tree import tree
+
+    with pytest.MonkeyPatch.context() as patch:
+        if pytestconfig.stash[DEVICE] == "cpu":
+            patch.setattr(tree, "STACK_SIZES", tuple(size for size in tree.STACK_SIZES if size >= STACK))
+        yield
+
+
+@pytest.fixture(scope="session")
+def device(request: pytest.FixtureRequest, pytestconfig: pytest.Config) -> str:
     """The Warp device that tests run on; skips if Warp can't be used."""
     if not BACKENDS["warp"].usable:
         pytest.skip(f"warp: {BACKENDS['warp'].reason}")
+    request.getfixturevalue("one_stack_size")
     return pytestconfig.stash[DEVICE]
 
 

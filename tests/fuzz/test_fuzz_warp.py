@@ -11,7 +11,7 @@ from support.odd_answers import FORMS, answers, case_of, different, scene_of
 from support.warp_launches import assert_bit_identical, cpu_answers, warp_answers
 
 from wive import _cpu
-from wive.warp_kernels.tree.tree import STACK_SIZES
+from wive.warp_kernels.tree import tree
 
 FEW = 4  # rays traced by eight threads each, which are slow fibers on this device
 
@@ -35,11 +35,12 @@ def test_kernels_give_the_bits_of_the_core(form: str, seeds: Iterator[int]) -> N
                 raise AssertionError(f"seed {seed}, {lanes} lanes") from error
 
 
+@pytest.mark.usefixtures("one_stack_size")
 @pytest.mark.parametrize("form", ["watertight", "float64 rays"])
 def test_scenes_give_the_bits_of_the_core(form: str, seeds: Iterator[int]) -> None:
     for seed in some(seeds):
         case = case_of(seed, form)
         scene = scene_of(case, form, "warp")
-        if scene.tree.stack == STACK_SIZES[0]:  # others need kernels that no other test does
+        if scene.tree.stack == tree.STACK_SIZES[0]:  # others need kernels that no other test does
             found, expected = answers(scene, case), answers(scene_of(case, form, "scalar"), case)
             assert different(found, expected) == [], seed

@@ -29,8 +29,8 @@ BLOCK_REGISTERS = 64 * 1024  # on every CUDA device
 QUERIES = ("closest", "any", "count", "all")
 
 # Every query on one architecture, and on the others those two that hold nearly all there is to compile, in
-# the accuracy that has more of it; exact trees, which take longest, on one architecture. Of compressed nodes and
-# of float64, every query in one accuracy and the closest hit in each.
+# the accuracy that has more of it; exact trees, which take longest, on one architecture. Of compressed nodes
+# and of float64, every query in one accuracy and the closest hit in each.
 EXACT_QUERIES = ("closest", "count")
 BUILDS = [
     *[(query, 90, accuracy) for query in QUERIES for accuracy in ("fast", "watertight")],

@@ -1,15 +1,18 @@
-"""A tree whose memory was overwritten ends in an error, never in a hang."""
+"""A tree whose memory was overwritten ends in an error, never in a hang; stacks are as large as trees need."""
+
+import dataclasses
 
 import numpy as np
 import pytest
 
 wp = pytest.importorskip("warp")
 
-from support.meshes import random_rays, sphere
+from support.meshes import random_rays, soup, sphere
 
 from wive import _cpu, warp_kernels
+from wive.warp_kernels.tree import tree as trees
 
-pytestmark = pytest.mark.timeout(60)
+pytestmark = [pytest.mark.timeout(60), pytest.mark.usefixtures("one_stack_size")]
 
 
 def launch_all(tree: warp_kernels.Tree, lanes: warp_kernels.launching.launch.Lanes) -> np.ndarray:
@@ -68,3 +71,27 @@ def test_hits_that_were_counted_but_are_no_longer_found_are_misses(
     prim = listed[1].numpy().reshape(32, 3)
     assert (prim[:, 0] >= 0).all() and (prim[:, 1:] == -1).all()
     assert np.isinf(listed[0].numpy().reshape(32, 3)[:, 1:]).all()
+
+
+def test_kernels_have_the_smallest_stack_that_the_tree_cannot_overflow(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    for mesh in (sphere(2), soup(3000, 2)):
+        needed = warp_kernels.upload(_cpu.Bvh(*mesh), "cpu").batch_handle.stack
+        for sizes, chosen in (((8, needed, 512), needed), ((8, needed - 1, 500, 512), 500)):
+            monkeypatch.setattr(trees, "STACK_SIZES", sizes)
+            assert warp_kernels.upload(_cpu.Bvh(*mesh), "cpu").stack == chosen
+
+
+@pytest.mark.parametrize("nodes", ["float32", "compressed"])
+def test_a_stack_of_the_size_that_a_tree_needs_is_enough(nodes: str) -> None:
+    bvh = _cpu.Bvh(*soup(3000, 2, size=0.9), nodes=nodes)
+    tree = warp_kernels.upload(bvh, "cpu")
+    origins, directions = random_rays(200, 1, 0, 1)
+    rays = [wp.array(a, dtype=wp.vec3, device="cpu") for a in (origins, directions)]
+    rays += [wp.zeros(1, dtype=wp.float32, device="cpu"), wp.full(1, 1e30, dtype=wp.float32, device="cpu")]
+    counts = wp.zeros(200, dtype=wp.int32, device="cpu")
+    warp_kernels.launch_count(dataclasses.replace(tree, stack=tree.batch_handle.stack), *rays, counts)
+    warp_kernels.check(tree)
+    expected, _ = bvh.count("scalar", origins, directions, np.zeros(1, np.float32), np.float32([1e30]))
+    np.testing.assert_array_equal(counts.numpy(), expected)

@@ -1,17 +1,18 @@
 """Every query, accuracy and backend on the same rays: the Warp forms answer bit for bit as the C++ core."""
 
+import dataclasses
 from collections.abc import Callable
 
 import numpy as np
 import pytest
 
-pytest.importorskip("warp")
+wp = pytest.importorskip("warp")
 
 from support.hard_rays import HARD_MESHES, hard_rays
 from support.meshes import random_rays, soup, sphere
-from support.warp_launches import assert_bit_identical, cpu_answers, warp_answers
+from support.warp_launches import INFINITE, STACK, ZERO, assert_bit_identical, cpu_answers, warp_answers
 
-from wive import _cpu
+from wive import _cpu, warp_kernels
 
 pytestmark = pytest.mark.timeout(120)
 
@@ -85,10 +86,19 @@ def test_partial_blocks_give_the_hits_of_full_ones(count: int, accuracy: str, no
 
 @pytest.mark.parametrize("block_dim", [8, 24, 128])
 def test_block_size_does_not_change_the_answer(block_dim: int) -> None:
+    """Of the closest hit: a block's groups and their stacks are those of every query."""
     bvh = _cpu.Bvh(*soup(3000, 2))
-    origins, directions = random_rays(101, 4)
-    reference = cpu_answers(bvh, "scalar", origins, directions)
-    assert_bit_identical(warp_answers(bvh, 1, origins, directions, block_dim=block_dim), reference)
+    origins, directions = random_rays(101, 4, 0.0, 1.0)
+    tree = dataclasses.replace(warp_kernels.upload(bvh, "cpu"), stack=STACK)
+    rays = [wp.array(a, dtype=wp.vec3, device="cpu") for a in (origins, directions)]
+    rays += [wp.array(a, dtype=wp.float32, device="cpu") for a in (ZERO, INFINITE)]
+    t, prim = (wp.zeros(101, dtype=dtype, device="cpu") for dtype in (wp.float32, wp.int32))
+    warp_kernels.launch_closest(tree, *rays, t, prim, lanes=1, block_dim=block_dim)
+    warp_kernels.check(tree)
+    expected = cpu_answers(bvh, "scalar", origins, directions)
+    assert (expected.prim >= 0).any()
+    np.testing.assert_array_equal(prim.numpy(), expected.prim)
+    np.testing.assert_array_equal(t.numpy(), expected.t)
 
 
 @pytest.mark.parametrize("lanes", [8, 1])
