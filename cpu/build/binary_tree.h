@@ -92,6 +92,10 @@ struct BinaryTree {
         assert(tree.has_node());
         return std::bit_cast<BinaryNode>(nodes[tree.place]);
     }
+    // Fetches the nodes below a subtree.
+    void prefetch_nodes(const Subtree& tree) const {
+        for (std::uint32_t i = tree.begin; i < tree.end; i += 2) __builtin_prefetch(&nodes[i]);
+    }
     Box box_of(const Subtree& tree) const {
         if (tree.has_node()) return nodes[tree.place].box();
         Box box;

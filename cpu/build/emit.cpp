@@ -22,6 +22,8 @@ namespace {
 
 // A thread emits one subtree at a time. There are about subtree_count of them, within these numbers of triangles.
 constexpr std::uint32_t subtree_count = 64, largest_subtree = 1 << 14, smallest_subtree = 1 << 10;
+// What a subtree of this size is written from is fetched beforehand: it fits the cache.
+constexpr std::uint32_t prefetched_size = 128;
 
 // A leaf's prims in ascending order. choose_collapse makes no leaf of more than max_leaf_blocks.
 class LeafPrims {
@@ -178,7 +180,11 @@ private:
     }
 
     // Emits a subtree from `cursor` on. Returns its depth in nodes.
-    int emit_subtree(const Slot& slot, std::size_t place, Size& cursor) {
+    int emit_subtree(const Slot& slot, std::size_t place, Size& cursor, bool prefetched = false) {
+        if (!prefetched && slot.tree.size() <= prefetched_size) {
+            prefetched = true;
+            prefetch(slot.tree);
+        }
         const Treelet treelet = treelet_of(slot);
         Children children;
         std::size_t child_node = cursor.nodes;
@@ -190,9 +196,16 @@ private:
         int deepest = 0;
         for (int i = 0; i < treelet.count; ++i) {
             const Slot& child = treelet.slots[static_cast<std::size_t>(i)];
-            if (!child.leaf) deepest = std::max(deepest, emit_subtree(child, child_node++, cursor));
+            if (!child.leaf) deepest = std::max(deepest, emit_subtree(child, child_node++, cursor, prefetched));
         }
         return deepest + 1;
+    }
+
+    // Fetches what is read to emit a subtree and lies anywhere in memory.
+    void prefetch(const Subtree& tree) const {
+        tree_.prefetch_nodes(tree);
+        for (std::uint32_t i = tree.begin; i < tree.end; ++i) mesh_.prefetch_face(tree_.refs[i].prim());
+        for (std::uint32_t i = tree.begin; i < tree.end; ++i) mesh_.prefetch_corners(tree_.refs[i].prim());
     }
 
     void write_node(std::size_t place, const Treelet& treelet, const Children& children) const {

@@ -35,6 +35,12 @@ struct Mesh {
     }
     const Real* corner(std::size_t face, int k) const { return vertices + 3 * vertex(face, k); }
 
+    // Fetch a face, and its corners.
+    void prefetch_face(std::size_t face) const { __builtin_prefetch(faces + 3 * face); }
+    void prefetch_corners(std::size_t face) const {
+        for (int k = 0; k < 3; ++k) __builtin_prefetch(corner(face, k));
+    }
+
     // Copies a face's corners. False if a coordinate is out of range, or NaN.
     bool load_corners(std::size_t face, Real (&corners)[3][3]) const {
         bool in_range = true;
