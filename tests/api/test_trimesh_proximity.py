@@ -93,7 +93,7 @@ def test_one_intersector_alone_has_closest_points_and_follows_the_mesh(part: "tr
         rays.closest_point([1, 2])
 
 
-@pytest.mark.parametrize("scale", [1e-200, 1e-30, 1e30, 1e200])
+@pytest.mark.parametrize("scale", [1e-60, 1e-30, 1e30, 1e60])
 def test_meshes_of_every_size_have_closest_points(scale: float) -> None:
     mesh = trimesh.creation.box((2, 2, 2))
     mesh.apply_scale(scale)
