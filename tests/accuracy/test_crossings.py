@@ -17,6 +17,8 @@ from support.oracle import cross, integers, unit_of
 from support.voxels import SIDE, surface_rays, voxels
 
 import wive
+from wive import _cpu
+from wive._internal.distant import MOST_COORDINATE, Ball
 
 Nodes = Literal["float32", "compressed"]
 KINDS = [(np.float32, "float32"), (np.float32, "compressed"), (np.float64, "float32")]
@@ -226,7 +228,7 @@ def test_every_backend_crosses_the_same_triangles(usable_backends: list[str], na
     rays = origins[some].astype(dtype), directions[some].astype(dtype)
     solid = has_area(vertices, faces)
     for touching in (False, True):
-        right = triangles_met(*mesh, *rays, touching=touching) & solid
+        right = triangles_met(*mesh, *as_traced(wive.Scene(*mesh), *rays), touching=touching) & solid
         for backend in backends:
             scene = wive.Scene(*mesh, backend=backend)
             found = scene.intersect_all(*rays, tmin=-np.inf, touching=touching)
@@ -236,6 +238,20 @@ def test_every_backend_crosses_the_same_triangles(usable_backends: list[str], na
             np.testing.assert_array_equal(
                 scene.count(*rays, tmin=-np.inf, touching=touching), right.sum(axis=1)
             )
+
+
+def as_traced(
+    scene: wive.Scene, origins: np.ndarray, directions: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """The rays as the core traces them: those that start far away from a float32 scene are brought near."""
+    if origins.dtype == np.float64:
+        return origins, directions
+    ball = Ball.around(scene.bounds, scene._bvh.far_distance)
+    given = origins.astype(np.float64), directions.astype(np.float64)
+    limits = np.float32([-np.inf]), np.float32([np.inf])
+    where = ball.center.tolist(), ball.far, MOST_COORDINATE
+    brought = _cpu.bring_near(*given, origins, directions, *limits, *where, kept=False)
+    return (origins if brought is None else brought[0]), directions
 
 
 def has_area(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""A tree whose memory was overwritten ends in an error, never in a hang; stacks are as large as trees need."""
+"""A tree whose memory was overwritten ends in an error, never in a hang; stacks suffice for any tree."""
 
 import dataclasses
 
