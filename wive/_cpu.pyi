@@ -119,6 +119,20 @@ class Bvh:
         bits.
         """
     @property
+    def facts(self) -> dict[str, Any]:
+        """What `stored_tree` takes besides arrays and options."""
+    @property
+    def source(self) -> Any:
+        """The argument `source` of `stored_tree`; None for a tree that was built here."""
+    def checksums(self) -> tuple[int, int, int]:
+        """64-bit checksums of `units`, vertices and faces; these are not verified."""
+    def verify(self) -> None:
+        """Verify a stored tree, unless that is done already; queries and the views of nodes do so first.
+
+        Raises ValueError, with the tree's name, if a checksum is wrong, or a reference, a number or an order
+        row that could make a query read outside of the tree or never end.
+        """
+    @property
     def center(self) -> NDArray[np.float32]:
         """(3,) the point box planes are relative to."""
     @property
@@ -376,4 +390,28 @@ def between(
 
     constants: the members of Separation (cpu/core/separation.inc); errors: those of a and of b. False for no
     triangle. The interpreter lock is released.
+    """
+
+def stored_tree(
+    units: NDArray[np.uint8],
+    vertices: NDArray[Real],
+    faces: NDArray[np.int32],
+    accuracy: str,
+    nodes: str,
+    quality: str,
+    node_count: int,
+    triangle_count: int,
+    depth: int,
+    center: Sequence[float],
+    extent: Sequence[float],
+    far_away: float,
+    bounds: Sequence[Sequence[float]],
+    checksums: Sequence[int],
+    name: str,
+    source: object,
+) -> Bvh:
+    """A tree that was built before: units, (bytes,) at a multiple of 64, are used where they lie.
+
+    It is verified before its first use, see `Bvh.verify`; only what takes no time is checked here. `source`
+    is kept.
     """

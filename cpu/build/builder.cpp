@@ -37,16 +37,18 @@ constexpr double far_from_origin = 4;
 }  // namespace
 
 template <class Real>
-Bvh::Bvh(const Mesh<Real>& mesh, const BuildOptions& options)
-    : accuracy_(options.accuracy), precision_(precision_of<Real>), form_(options.nodes) {
+Bvh::Bvh(const Mesh<Real>& mesh, const BuildOptions& options) {
+    facts_.accuracy = options.accuracy;
+    facts_.precision = precision_of<Real>;
+    facts_.form = options.nodes;
     constexpr bool doubles = precision_of<Real> == Precision::float64;
     Threads threads(thread_count(options.threads));
     if (mesh.face_count >= leaf_bit) throw too_many_triangles(mesh.face_count);
-    if (doubles && accuracy_ == Accuracy::exact)
+    if (doubles && facts_.accuracy == Accuracy::exact)
         throw std::invalid_argument(
             "accuracy: 'exact' takes vertices in float32, got float64; round them, or use 'watertight'");
     if constexpr (!doubles)
-        if (form_ == NodeForm::compressed) {
+        if (facts_.form == NodeForm::compressed) {
             // A compressed leaf takes the memory that its vertices need, and they are counted before they are written.
             const MeshCopy copy(mesh, threads);
             build(copy.mesh(), options, threads);
@@ -60,17 +62,18 @@ void Bvh::build(const Mesh<Real>& mesh, const BuildOptions& options, Threads& th
     constexpr bool doubles = precision_of<Real> == Precision::float64;
     check_mesh(mesh, threads);
     if constexpr (doubles) set_bounds(find_bounds(mesh, threads));
-    far_away_ = far_away_from(mesh);
+    facts_.far_away = far_away_from(mesh);
     const auto build_binary = [&] {
-        PrimRefs refs = make_prim_refs(mesh, center_, threads);
+        PrimRefs refs = make_prim_refs(mesh, facts_.center, threads);
         // Before the work: if full blocks alone are too large, emit_tree would refuse the tree.
-        if (refs.count / block_width * fewest_block_units(precision_, form_) > max_units)
+        if (refs.count / block_width * fewest_block_units(facts_.precision, facts_.form) > max_units)
             throw too_many_triangles(refs.count);
-        return build_binary_tree(std::move(refs), threads, options.depth_limit, largest_leaf(precision_, form_));
+        return build_binary_tree(std::move(refs), threads, options.depth_limit,
+                                 largest_leaf(facts_.precision, facts_.form));
     };
     BinaryTree tree = build_binary();
     if (options.quality == Quality::high) optimize_by_reinsertion(tree, threads);
-    triangle_count_ = tree.count;
+    facts_.triangle_count = tree.count;
     const Point remaining_center = finish_bounds(tree.box);
     EmittedTree emitted = emit_tree(tree, mesh, options, remaining_center, threads);
     if (emitted.depth > options.depth_limit) {  // reinsertion has no depth limit, binning has
@@ -78,9 +81,9 @@ void Bvh::build(const Mesh<Real>& mesh, const BuildOptions& options, Threads& th
         emitted = emit_tree(tree, mesh, options, remaining_center, threads);
     }
     ensure(emitted.depth <= max_depth, "a tree of at most max_depth levels");
-    units_ = std::move(emitted.units);
-    node_count_ = emitted.node_count;
-    depth_ = emitted.depth;
+    own(std::move(emitted.units));
+    facts_.node_count = emitted.node_count;
+    facts_.depth = emitted.depth;
 }
 
 template Bvh::Bvh(const Mesh<float>&, const BuildOptions&);
@@ -89,48 +92,51 @@ template Bvh::Bvh(const Mesh<double>&, const BuildOptions&);
 // For a mesh far from the origin, planes relative to its middle keep the boxes' slack small. Near the origin the centre
 // is zero, and planes stay exact.
 void Bvh::set_bounds(const Bounds& bounds) {
-    bounds_ = bounds;
-    const auto& [low, high] = bounds_;
+    facts_.bounds = bounds;
+    const auto& [low, high] = facts_.bounds;
     if (!(low[0] <= high[0])) return;
     const double half_size = 0.5 * std::max({high[0] - low[0], high[1] - low[1], high[2] - low[2]});
     for (std::size_t axis = 0; axis < 3; ++axis) {
         const double middle = 0.5 * low[axis] + 0.5 * high[axis];
-        center_[axis] = std::abs(middle) > far_from_origin * half_size ? static_cast<float>(middle) : 0.0f;
+        facts_.center[axis] = std::abs(middle) > far_from_origin * half_size ? static_cast<float>(middle) : 0.0f;
     }
 }
 
 Point Bvh::finish_bounds(const Box& all) {
     Point remaining_center{};
-    if (precision_ == Precision::float32) {
+    if (facts_.precision == Precision::float32) {
         set_bounds({{{all.lo[0], all.lo[1], all.lo[2]}, {all.hi[0], all.hi[1], all.hi[2]}}});
-        remaining_center = center_;
+        remaining_center = facts_.center;
     }
     if (all.lo[0] <= all.hi[0])
         for (std::size_t axis = 0; axis < 3; ++axis) {
             const float center = remaining_center[axis];
-            extent_[axis] = std::max(plane_above(all.hi[axis], center), -plane_below(all.lo[axis], center));
+            facts_.extent[axis] = std::max(plane_above(all.hi[axis], center), -plane_below(all.lo[axis], center));
         }
     return remaining_center;
 }
 
 BvhView Bvh::view() const {
-    return {units_.data(), {center_[0], center_[1], center_[2], 0}, {extent_[0], extent_[1], extent_[2], 0}, far_away_};
+    return {units_.data(),
+            {facts_.center[0], facts_.center[1], facts_.center[2], 0},
+            {facts_.extent[0], facts_.extent[1], facts_.extent[2], 0},
+            facts_.far_away};
 }
 
 // Beyond 256 radii, float32 moves a ray by up to 1e-4 radii, which may be more than a typical triangle's size before.
 // Coordinates of the scene themselves are rounded by as much as distances up to those of its middle.
 double Bvh::far_distance() const {
-    const auto& [low, high] = bounds_;
+    const auto& [low, high] = facts_.bounds;
     const double radius = 0.5 * std::hypot(high[0] - low[0], high[1] - low[1], high[2] - low[2]);
     if (!(radius < std::numeric_limits<double>::infinity())) return std::numeric_limits<double>::infinity();
-    double distance = std::clamp<double>(far_away_, 2 * radius, 256 * radius);
+    double distance = std::clamp<double>(facts_.far_away, 2 * radius, 256 * radius);
     for (std::size_t axis = 0; axis < 3; ++axis)
         distance = std::max(distance, std::abs(0.5 * low[axis] + 0.5 * high[axis]));
     return distance;
 }
 
 bool Bvh::may_have_far(const float* origins, std::size_t count) const {
-    const auto& [low, high] = bounds_;
+    const auto& [low, high] = facts_.bounds;
     constexpr double infinity = std::numeric_limits<double>::infinity();
     double lowest = -infinity, highest = infinity;
     for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -154,7 +160,7 @@ Bvh::Sah Bvh::sah_of(double root) const {
         return d[0] < 0 ? 0.0 : d[0] * d[1] + d[1] * d[2] + d[2] * d[0];
     };
     Sah sah = {1, 0};
-    for (const StoredNode& node : std::span(reinterpret_cast<const StoredNode*>(units_.data()), node_count_))
+    for (const StoredNode& node : std::span(reinterpret_cast<const StoredNode*>(units_.data()), facts_.node_count))
         for (int lane = 0; lane < node_width; ++lane) {
             const std::uint32_t child = node.child[lane];
             const double area = half_area(node, lane) / root;
@@ -168,10 +174,10 @@ Bvh::Sah Bvh::sah_of(double root) const {
 
 Bvh::Sah Bvh::sah() const {
     double d[3];
-    for (std::size_t axis = 0; axis < 3; ++axis) d[axis] = bounds_[1][axis] - bounds_[0][axis];
+    for (std::size_t axis = 0; axis < 3; ++axis) d[axis] = facts_.bounds[1][axis] - facts_.bounds[0][axis];
     const double root = d[0] * d[1] + d[1] * d[2] + d[2] * d[0];
     if (!(root > 0 && root < std::numeric_limits<double>::infinity())) return {0, 0};
-    return form_ == NodeForm::float32 ? sah_of<Node>(root) : sah_of<CompressedNode>(root);
+    return facts_.form == NodeForm::float32 ? sah_of<Node>(root) : sah_of<CompressedNode>(root);
 }
 
 }  // namespace wive

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <memory>
 #include <span>
+#include <utility>
 
 #include "build/mesh.h"
 #include "core/box.h"
@@ -25,11 +26,29 @@ struct BuildOptions {
     Quality quality = Quality::medium;
 };
 
+// What queries need to know of a tree besides its nodes and blocks.
+struct TreeFacts {
+    std::size_t node_count = 0, triangle_count = 0;  // triangles in leaves
+    Accuracy accuracy = Accuracy::watertight;
+    Precision precision = Precision::float32;
+    NodeForm form = NodeForm::float32;
+    int depth = 0;
+    Point center{}, extent{};  // those of BvhView
+    float far_away = 0;
+    Bounds bounds{};
+
+    std::size_t node_bytes() const { return form == NodeForm::float32 ? sizeof(Node) : sizeof(CompressedNode); }
+};
+
 class Bvh {
 public:
     // Throws std::invalid_argument for a mesh that check_mesh refuses. The same tree on any number of threads.
     template <class Real>
     Bvh(const Mesh<Real>& mesh, const BuildOptions& options);
+
+    // A tree over memory of others, which must hold its nodes and outlive it; aligned to 64 bytes. It is not checked:
+    // see verify.h.
+    Bvh(const TreeFacts& facts, std::span<const std::byte> units) : facts_(facts), units_(units) {}
 
     // Refits to moved vertices: new boxes and triangles, the same children and orders. Returns null if refitting is
     // impossible: a formerly degenerate triangle (in no leaf) gained area, or the tree is compressed (leaf sizes depend
@@ -44,15 +63,17 @@ public:
     // Whether an origin (n, 3) may be farther away.
     bool may_have_far(const float* origins, std::size_t count) const;
     std::size_t bytes() const { return units_.size(); }
+    std::span<const std::byte> units() const { return units_; }
     // The stored bytes of all nodes and of all blocks. Compressed blocks have two sizes (see CompressedBlock).
-    std::span<const std::byte> nodes() const { return {units_.data(), node_count_ * node_bytes()}; }
-    std::span<const std::byte> blocks() const { return {units_.data() + nodes().size(), bytes() - nodes().size()}; }
-    std::size_t node_bytes() const { return form_ == NodeForm::float32 ? sizeof(Node) : sizeof(CompressedNode); }
-    Accuracy accuracy() const { return accuracy_; }
-    Precision precision() const { return precision_; }
-    NodeForm node_form() const { return form_; }
-    int depth() const { return depth_; }
-    const Bounds& bounds() const { return bounds_; }
+    std::span<const std::byte> nodes() const { return units_.first(facts_.node_count * node_bytes()); }
+    std::span<const std::byte> blocks() const { return units_.subspan(nodes().size()); }
+    std::size_t node_bytes() const { return facts_.node_bytes(); }
+    const TreeFacts& facts() const { return facts_; }
+    Accuracy accuracy() const { return facts_.accuracy; }
+    Precision precision() const { return facts_.precision; }
+    NodeForm node_form() const { return facts_.form; }
+    int depth() const { return facts_.depth; }
+    const Bounds& bounds() const { return facts_.bounds; }
 
     struct Sah {
         double nodes, blocks;
@@ -71,16 +92,15 @@ private:
     Point finish_bounds(const Box& all);
     template <class StoredNode>
     Sah sah_of(double root) const;
+    // Takes the memory of nodes and blocks.
+    void own(LargeArray<std::byte> units) {
+        memory_ = std::move(units);
+        units_ = {memory_.data(), memory_.size()};
+    }
 
-    LargeArray<std::byte> units_;
-    std::size_t node_count_ = 0, triangle_count_ = 0;
-    Accuracy accuracy_ = Accuracy::watertight;
-    Precision precision_ = Precision::float32;
-    NodeForm form_ = NodeForm::float32;
-    int depth_ = 0;
-    Point center_{}, extent_{};
-    float far_away_ = 0;
-    Bounds bounds_{};
+    TreeFacts facts_;
+    LargeArray<std::byte> memory_;  // empty if the units are others'
+    std::span<const std::byte> units_;
 };
 
 }  // namespace wive

@@ -133,26 +133,28 @@ bool is_any_missing(std::span<const TriangleBlockOf<Real>> blocks, const Mesh<Re
 
 template <class Real>
 std::unique_ptr<Bvh> Bvh::refitted(const Mesh<Real>& mesh, unsigned requested_threads) const {
-    if (form_ != NodeForm::float32) return nullptr;
+    if (facts_.form != NodeForm::float32) return nullptr;
     Threads threads(thread_count(requested_threads));
     check_mesh(mesh, threads);
-    if (triangle_count_ < mesh.face_count && is_any_missing(blocks_of<Real>(*this), mesh, threads)) return nullptr;
+    if (facts_.triangle_count < mesh.face_count && is_any_missing(blocks_of<Real>(*this), mesh, threads))
+        return nullptr;
     std::unique_ptr<Bvh> bvh(new Bvh);
-    bvh->units_ = LargeArray<std::byte>(units_.size());
-    bvh->node_count_ = node_count_;
-    bvh->accuracy_ = accuracy_;
-    bvh->precision_ = precision_;
-    bvh->depth_ = depth_;
-    bvh->far_away_ = far_away_from(mesh);
+    bvh->own(LargeArray<std::byte>(units_.size()));
+    std::byte* const units = bvh->memory_.data();
+    bvh->facts_.node_count = facts_.node_count;
+    bvh->facts_.accuracy = facts_.accuracy;
+    bvh->facts_.precision = facts_.precision;
+    bvh->facts_.depth = facts_.depth;
+    bvh->facts_.far_away = far_away_from(mesh);
     const BvhView from = view();
     if constexpr (precision_of<Real> == Precision::float64) bvh->set_bounds(find_bounds(mesh, threads));
-    BoxFitter<Real> fitter(from, node_count_, bvh->units_.data(), mesh, bvh->center_, accuracy_);
+    BoxFitter<Real> fitter(from, facts_.node_count, units, mesh, bvh->facts_.center, facts_.accuracy);
     fitter.fit(threads);
-    bvh->triangle_count_ = fitter.triangle_count();
+    bvh->facts_.triangle_count = fitter.triangle_count();
     const Point remaining_center = bvh->finish_bounds(fitter.all());
     const Node* old_nodes = reinterpret_cast<const Node*>(units_.data());
-    Node* to = reinterpret_cast<Node*>(bvh->units_.data());
-    parallel_chunks(node_count_, chunk_size, threads, [&](std::size_t begin, std::size_t end) {
+    Node* to = reinterpret_cast<Node*>(units);
+    parallel_chunks(facts_.node_count, chunk_size, threads, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) {
             const Node& old = old_nodes[i];
             for (int lane = 0; lane < node_width; ++lane)

@@ -12,23 +12,12 @@
 #include "render/render.h"
 
 namespace wive {
-namespace {
-
-#if defined(__clang__)
-constexpr const char* compiler_name = "clang " __clang_version__;
-#else
-constexpr const char* compiler_name = "gcc " __VERSION__;
-#endif
 
 Accuracy parse_accuracy(const std::string& name) {
     if (name == "fast") return Accuracy::fast;
     if (name == "watertight") return Accuracy::watertight;
     expect(name == "exact", "accuracy: expected 'fast', 'watertight' or 'exact'");
     return Accuracy::exact;
-}
-
-const char* accuracy_name(Accuracy accuracy) {
-    return accuracy == Accuracy::fast ? "fast" : accuracy == Accuracy::watertight ? "watertight" : "exact";
 }
 
 NodeForm parse_nodes(const std::string& name) {
@@ -41,6 +30,18 @@ Quality parse_quality(const std::string& name) {
     if (name == "high") return Quality::high;
     expect(name == "medium", "quality: expected 'medium' or 'high'");
     return Quality::medium;
+}
+
+namespace {
+
+#if defined(__clang__)
+constexpr const char* compiler_name = "clang " __clang_version__;
+#else
+constexpr const char* compiler_name = "gcc " __VERSION__;
+#endif
+
+const char* accuracy_name(Accuracy accuracy) {
+    return accuracy == Accuracy::fast ? "fast" : accuracy == Accuracy::watertight ? "watertight" : "exact";
 }
 
 Albedo parse_albedo(const std::string& name) {
@@ -213,9 +214,10 @@ PYBIND11_MODULE(_cpu, m, pybind11::mod_gil_not_used()) {
             array_arg("vertices"), py::arg("threads") = 0);
     });
     bvh.def_property_readonly("vertices", &PyBvh::vertices)
-        .def_property_readonly(
-            "precision",
-            [](const PyBvh& self) { return self.bvh().precision() == Precision::float32 ? "float32" : "float64"; })
+        .def_property_readonly("precision",
+                               [](const PyBvh& self) {
+                                   return self.unverified().precision() == Precision::float32 ? "float32" : "float64";
+                               })
         .def_property_readonly("nodes",
                                [](const py::object& self) {
                                    const Bvh& bvh = self.cast<const PyBvh&>().bvh();
@@ -240,32 +242,34 @@ PYBIND11_MODULE(_cpu, m, pybind11::mod_gil_not_used()) {
             })
         .def_property_readonly("center",
                                [](const PyBvh& self) {
-                                   const BvhView v = self.bvh().view();
+                                   const BvhView v = self.unverified().view();
                                    return copy(std::array{v.center[0], v.center[1], v.center[2]});
                                })
         .def_property_readonly("extent",
                                [](const PyBvh& self) {
-                                   const BvhView v = self.bvh().view();
+                                   const BvhView v = self.unverified().view();
                                    return copy(std::array{v.extent[0], v.extent[1], v.extent[2]});
                                })
         .def_property_readonly("bounds",
                                [](const PyBvh& self) -> py::array {
                                    const DefaultFloats floats;  // for the conversion to float32
-                                   py::array_t<double> bounds({2, 3}, self.bvh().bounds()[0].data());
-                                   if (self.bvh().precision() == Precision::float64) return bounds;
+                                   py::array_t<double> bounds({2, 3}, self.unverified().bounds()[0].data());
+                                   if (self.unverified().precision() == Precision::float64) return bounds;
                                    return py::array_t<float>(bounds);
                                })
         .def_property_readonly("far_distance",
                                [](const PyBvh& self) {
                                    const DefaultFloats floats;
-                                   return self.bvh().far_distance();
+                                   return self.unverified().far_distance();
                                })
-        .def_property_readonly("accuracy", [](const PyBvh& self) { return accuracy_name(self.bvh().accuracy()); })
-        .def_property_readonly(
-            "node_form",
-            [](const PyBvh& self) { return self.bvh().node_form() == NodeForm::float32 ? "float32" : "compressed"; })
-        .def_property_readonly("depth", [](const PyBvh& self) { return self.bvh().depth(); })
-        .def_property_readonly("memory", [](const PyBvh& self) { return self.bvh().bytes(); })
+        .def_property_readonly("accuracy",
+                               [](const PyBvh& self) { return accuracy_name(self.unverified().accuracy()); })
+        .def_property_readonly("node_form",
+                               [](const PyBvh& self) {
+                                   return self.unverified().node_form() == NodeForm::float32 ? "float32" : "compressed";
+                               })
+        .def_property_readonly("depth", [](const PyBvh& self) { return self.unverified().depth(); })
+        .def_property_readonly("memory", [](const PyBvh& self) { return self.unverified().bytes(); })
         .def_property_readonly("sah",
                                [](const PyBvh& self) {
                                    const DefaultFloats floats;
@@ -282,4 +286,5 @@ PYBIND11_MODULE(_cpu, m, pybind11::mod_gil_not_used()) {
     bind_spawn(m);
     bind_segments(m);
     bind_distant(m);
+    bind_stored(m, bvh);
 }

@@ -6,9 +6,13 @@
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>
 
+#include <array>
 #include <atomic>
+#include <cstdint>
 #include <memory>
 #include <mutex>
+#include <optional>
+#include <span>
 #include <stdexcept>
 #include <string>
 #include <tuple>
@@ -71,6 +75,20 @@ struct Released {
     DefaultFloats floats;
 };
 
+using Checksums = std::array<std::uint64_t, 3>;  // of units, vertices and faces
+
+// Where a tree lies that was not built here: in a file or in shared memory.
+struct Stored {
+    Array<std::uint8_t> units;  // (bytes,), keeps the memory
+    Checksums checksums;        // as the file states them
+    std::string name;           // of the file, for errors
+    py::object source;          // Python's record of it
+
+    std::span<const std::byte> bytes() const {
+        return std::as_bytes(std::span(units.data(), static_cast<std::size_t>(units.size())));
+    }
+};
+
 // A tree together with the arrays it was built from, which rendering reads.
 class PyBvh {
 public:
@@ -93,12 +111,42 @@ public:
         expect_shape(std::get<Array<Real>>(vertices_), 3, "vertices: expected shape (v, 3)");
         options_.threads = threads;
         const Mesh view = mesh<Real>();
+        const Bvh& old = other.bvh();
         const Released released;
-        bvh_ = other.bvh_->refitted(view, threads);
+        bvh_ = old.refitted(view, threads);
         if (!bvh_) bvh_ = std::make_unique<Bvh>(view, options_);
     }
 
-    const Bvh& bvh() const { return *bvh_; }
+    // A stored tree, whose nodes and blocks are those of `stored`. They and the mesh are verified before they are used.
+    template <class Real>
+    PyBvh(Array<Real> vertices, Array<std::int32_t> faces, const BuildOptions& options, const TreeFacts& facts,
+          Stored stored)
+        : vertices_(std::move(vertices)), faces_(std::move(faces)), options_(options), stored_(std::move(stored)) {
+        expect_shape(std::get<Array<Real>>(vertices_), 3, "vertices: expected shape (v, 3)");
+        expect_shape(faces_, 3, "faces: expected shape (f, 3)");
+        const std::span<const std::byte> units = stored_->bytes();
+        expect(facts.depth >= 1 && facts.depth <= max_depth, "depth: expected 1 to 64");
+        expect(reinterpret_cast<std::uintptr_t>(units.data()) % alignof(Node) == 0 && units.size() % unit_bytes == 0 &&
+                   units.size() / unit_bytes <= max_units,
+               "units: expected whole units at a multiple of 64 bytes");
+        expect(facts.node_count >= 1 && facts.node_count <= units.size() / facts.node_bytes(),
+               "node_count: expected a number of nodes that units hold");
+        bvh_ = std::make_unique<Bvh>(facts, units);
+        is_verified_ = false;
+    }
+
+    // Verifies a stored tree at the first call, which needs the interpreter lock; throws if it is damaged.
+    const Bvh& bvh() const {
+        if (!is_verified_.load(std::memory_order_acquire)) [[unlikely]]
+            verify();
+        return *bvh_;
+    }
+    // For what is not in nodes, blocks or the mesh.
+    const Bvh& unverified() const { return *bvh_; }
+    // What a stored tree came from; None for others.
+    py::object source() const { return stored_ ? stored_->source : py::none(); }
+    // Of units, vertices and faces. Verifies nothing.
+    Checksums checksums() const;
     const std::variant<Array<float>, Array<double>>& vertices() const { return vertices_; }
     template <class Real>
     Mesh<Real> mesh() const {
@@ -119,18 +167,22 @@ public:
     template <class Real>
     const WindingTable<Real>& winding() const {
         std::call_once(winding_made_,
-                       [this] { winding_.emplace<Winding<Real>>(new WindingTable(*bvh_, mesh<Real>())); });
+                       [this] { winding_.emplace<Winding<Real>>(new WindingTable(bvh(), mesh<Real>())); });
         return *std::get<Winding<Real>>(winding_);
     }
 
 private:
+    void verify() const;
+
     template <class Real>
     using Winding = std::unique_ptr<const WindingTable<Real>>;
 
     std::variant<Array<float>, Array<double>> vertices_;
     Array<std::int32_t> faces_;
     BuildOptions options_;
+    std::optional<Stored> stored_;
     std::unique_ptr<Bvh> bvh_;
+    mutable std::atomic<bool> is_verified_ = true;
     mutable std::once_flag winding_made_;
     mutable std::variant<Winding<float>, Winding<double>> winding_;
 };
@@ -181,12 +233,19 @@ using PyBvhClass = py::class_<PyBvh>;
 
 // Defined in bindings_queries.cpp: ray queries. In bindings_surface.cpp: points and normals of hits. In
 // bindings_closest.cpp: closest points. In bindings_spawn.cpp: spawned rays. In bindings_segments.cpp: line of sight.
+// In bindings_distant.cpp: rays from far away. In bindings_stored.cpp: stored trees.
 void bind_queries(PyBvhClass& bvh);
 void bind_closest(py::module_& m, PyBvhClass& bvh);
 void bind_surface(py::module_& m);
 void bind_spawn(py::module_& m);
 void bind_segments(py::module_& m);
 void bind_distant(py::module_& m);
+void bind_stored(py::module_& m, PyBvhClass& bvh);
+
+// The options of a tree by their names; std::invalid_argument for others. In bindings.cpp.
+Accuracy parse_accuracy(const std::string& name);
+NodeForm parse_nodes(const std::string& name);
+Quality parse_quality(const std::string& name);
 
 }  // namespace wive
 
