@@ -27,9 +27,10 @@ from wive.closest import Closest
 from wive.colors import load_colors
 from wive.geoms import Geoms
 from wive.hits import Hits, Stats
+from wive.loading import load
 from wive.meshfile import load_mesh
 from wive.rendering import render, write_picture
-from wive.scene import Scene, load
+from wive.scene import Scene
 from wive.sensors import EquirectangularCamera, OrthographicCamera, PinholeCamera, SpinningLidar
 
 __version__ = "0.1.0"

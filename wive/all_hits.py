@@ -9,14 +9,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from wive._internal.known_meshes import OfMesh, mesh_attributes
 from wive._internal.precision import Floats
-from wive._internal.read_only import ReadOnly
 from wive._internal.wrapping import Wrapping, from_home
 from wive.geoms import Geoms
 from wive.hits import geoms_of, surface_normals, surface_points
 
 
-class AllHits(ReadOnly):
+class AllHits(OfMesh):
     """All hits of n rays, h in all: ray by ray, each ray's by ascending t, at equal t by ascending prim.
 
     Arrays are NumPy's if the rays were, else of the library and on the device that the rays came in;
@@ -31,7 +31,7 @@ class AllHits(ReadOnly):
         vertices: (v,3) float32 and
         faces: (f,3) int32, the mesh that `prim` refers to.
 
-    t, uv and vertices are float64 for a float64 scene.
+    t, uv and vertices are float64 for a float64 scene. Pickles name the mesh, as those of `Hits`.
     """
 
     offsets: NDArray[np.int64]
@@ -115,8 +115,8 @@ class WrappedAllHits(AllHits):
     def __init__(self, home: Any, wrapping: Wrapping) -> None:
         """Wrap the arrays of `home`, an `AllHits` or a `WarpAllHits`; all else is computed when used."""
         offsets, t, prim, uv = map(wrapping.wrap, (home.offsets, home.t, home.prim, home.uv))
-        super().__init__(offsets, t, prim, uv, home.vertices, home.faces)
-        vars(self).update(_home=home, _wrapping=wrapping)
+        vars(self).update(offsets=offsets, t=t, prim=prim, uv=uv)
+        vars(self).update(mesh_attributes(home), _home=home, _wrapping=wrapping)
 
     counts = from_home(AllHits.counts)
     ray = from_home(AllHits.ray)

@@ -87,7 +87,9 @@ def _add_render(subparsers: "argparse._SubParsersAction[_Parser]") -> None:
         "camera stands inside.",
         formatter_class=_Defaults,
     )
-    parser.add_argument("mesh", nargs="?", metavar="MESH", help="mesh file; default: real terrain")
+    parser.add_argument(
+        "mesh", nargs="?", metavar="MESH", help="mesh file or saved scene; default: real terrain"
+    )
     parser.add_argument(
         "-o",
         "--output",
@@ -159,7 +161,7 @@ def _add_trace(subparsers: "argparse._SubParsersAction[_Parser]") -> None:
         "hit: those of ray i are rows offsets[i] to offsets[i+1], by ascending t.",
         formatter_class=_Defaults,
     )
-    parser.add_argument("mesh", metavar="MESH", help="mesh file")
+    parser.add_argument("mesh", metavar="MESH", help="mesh file or saved scene")
     parser.add_argument(
         "rays",
         metavar="RAYS",
@@ -191,17 +193,18 @@ def _add_info(subparsers: "argparse._SubParsersAction[_Parser]") -> None:
         help="a mesh and its tree in numbers",
         formatter_class=_Defaults,
     )
-    parser.add_argument("mesh", metavar="MESH", help="mesh file")
+    parser.add_argument("mesh", metavar="MESH", help="mesh file or saved scene")
     _add_scene_options(parser, threads=False)
     _add_precision(parser)
     parser.set_defaults(run=commands.describe_mesh)
 
 
 def _add_scene_options(parser: argparse.ArgumentParser, threads: bool = True) -> None:
-    parser.add_argument("--backend", default="auto", help=f"auto, {', '.join(CPU_BACKENDS)}, {WARP}")
+    own = "; a saved scene has its own"
+    parser.add_argument("--backend", help=f"auto, {', '.join(CPU_BACKENDS)}, {WARP} (default: auto){own}")
     parser.add_argument("--device", help="Warp device such as cuda:0 or cpu; implies --backend warp")
-    parser.add_argument("--accuracy", default="watertight", help="fast, watertight or exact")
-    parser.add_argument("--nodes", default="float32", help="float32 or compressed")
+    parser.add_argument("--accuracy", help=f"fast, watertight or exact (default: watertight){own}")
+    parser.add_argument("--nodes", help=f"float32 or compressed (default: float32){own}")
     if threads:
         parser.add_argument("--threads", type=int, help="default: every core")
 
@@ -210,6 +213,6 @@ def _add_precision(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--precision",
         choices=("float32", "float64"),
-        default="float32",
-        help="of coordinates and t; float64 if the file has finer ones",
+        help="of coordinates and t; float64 if the file has finer ones (default: float32); a saved scene has "
+        "its own",
     )

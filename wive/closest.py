@@ -7,14 +7,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from wive._internal.known_meshes import OfMesh, mesh_attributes
 from wive._internal.precision import Floats
-from wive._internal.read_only import ReadOnly
 from wive._internal.wrapping import Wrapping, from_home
 from wive.geoms import Geoms
 from wive.hits import OnSurface
 
 
-class Closest(OnSurface, ReadOnly):
+class Closest(OnSurface, OfMesh):
     """The closest point of the surface to each of n points; of their leading shape if that is another.
 
     Arrays are NumPy's if the points were, else of the library and on the device that the points came in;
@@ -28,6 +28,7 @@ class Closest(OnSurface, ReadOnly):
         faces: (f,3) int32, the mesh that `prim` refers to.
 
     distance, uv and vertices are float64 for a float64 scene. `points()` are the closest points themselves.
+    Pickles hold no mesh, as those of `Hits`.
     """
 
     distance: Floats
@@ -62,8 +63,8 @@ class WrappedClosest(Closest):
     def __init__(self, home: Any, wrapping: Wrapping) -> None:
         """Wrap distance, prim and uv of `home`; all else is computed when used."""
         distance, prim, uv = map(wrapping.wrap, (home.distance, home.prim, home.uv))
-        super().__init__(distance, prim, uv, home.vertices, home.faces)
-        vars(self).update(_home=home, _wrapping=wrapping)
+        vars(self).update(distance=distance, prim=prim, uv=uv, _geoms=None)
+        vars(self).update(mesh_attributes(home), _home=home, _wrapping=wrapping)
 
     mask = from_home(Closest.mask)
     geom = from_home(Closest.geom)

@@ -14,9 +14,9 @@ from wive._internal.distant import Moved
 from wive._internal.error_bounds import t_error_bounds
 from wive._internal.host_arrays import host_array
 from wive._internal.interpolation import interpolated, vertex_values_of
+from wive._internal.known_meshes import OfMesh, mesh_attributes, mesh_sizes
 from wive._internal.precision import FLOAT64, Floats, real_of
 from wive._internal.rays import Rays
-from wive._internal.read_only import ReadOnly
 from wive._internal.sides import cosines_of, meets_front
 from wive._internal.spawn import spawn_origins
 from wive._internal.wrapping import Wrapping, from_home
@@ -50,7 +50,7 @@ def surface_normals(
     return _cpu.surface_normals(vertices, faces, np.ascontiguousarray(prim))
 
 
-class OfMeshes(Protocol):
+class InMeshes(Protocol):
     """Hits in a scene of one mesh or several."""
 
     vertices: Floats
@@ -58,9 +58,9 @@ class OfMeshes(Protocol):
     _geoms: Geoms | None
 
 
-def geoms_of(hits: OfMeshes) -> Geoms:
+def geoms_of(hits: InMeshes) -> Geoms:
     """The meshes of the scene that was hit; hits in a scene of one mesh hold none."""
-    return hits._geoms or one_geom(len(hits.faces), len(hits.vertices))
+    return hits._geoms or one_geom(*mesh_sizes(hits))
 
 
 class OnSurface:
@@ -125,7 +125,7 @@ class OnSurface:
         return interpolated(values, self.faces, self.prim, self.uv)
 
 
-class Hits(OnSurface, ReadOnly):
+class Hits(OnSurface, OfMesh):
     """The closest hit of each of n rays; if these have another leading shape, (n,) below is that shape.
 
     Arrays are NumPy's if the rays were, else of the library and on the device that the rays came in;
@@ -139,6 +139,11 @@ class Hits(OnSurface, ReadOnly):
         faces: (f,3) int32, the mesh that `prim` refers to.
 
     t, uv and vertices are float64 for a float64 scene.
+
+    Pickles hold what was computed and the rays, not the mesh. They name it: by the file or the shared memory
+    that the scene is in, else by a token that the process of the scene and those forked from it know. It is
+    looked up when `points`, `normals` or others first need it; a process that has none raises ValueError
+    then, and `with_mesh` gives it one.
     """
 
     t: Floats
@@ -262,8 +267,8 @@ class WrappedHits(Hits):
     def __init__(self, home: Any, wrapping: Wrapping) -> None:
         """Wrap t, prim and uv of `home`, a `Hits` or a `WarpHits`; all else is computed when used."""
         t, prim, uv = map(wrapping.wrap, (home.t, home.prim, home.uv))
-        super().__init__(t, prim, uv, home.vertices, home.faces)
-        vars(self).update(_home=home, _wrapping=wrapping)
+        vars(self).update(t=t, prim=prim, uv=uv, _rays=None, _accuracy="", _moved=None, _geoms=None)
+        vars(self).update(mesh_attributes(home), _home=home, _wrapping=wrapping)
 
     mask = from_home(Hits.mask)
     geom = from_home(Hits.geom)

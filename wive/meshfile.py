@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import os
 from collections.abc import Callable
 from importlib import import_module
@@ -18,7 +19,8 @@ from wive._internal.lines import one_line
 from wive._internal.npzfile import check_input
 from wive._internal.precision import FLOAT32, Floats, Real, real_named
 from wive._internal.room import room_for
-from wive._internal.storage import refuse_saved_scene
+from wive._internal.storage import is_saved_scene
+from wive._internal.tree_file import is_image
 
 # Readers of formats that may be text.
 TEXT = ("obj", "off", "ply", "stl")
@@ -60,14 +62,21 @@ def load_mesh(
     """
     real = real_named(dtype)
     name, folder, data = content_of(source)
+    if is_image(data):
+        raise _no_mesh(name)
     kind = kind_of(data, name, file_type)
     if not data:
         raise ValueError(f"{name}: is empty")
     if packed := compression_of(data):
         raise unread(name, packed)
     with room_for(name):
-        refuse_saved_scene(name, data)
+        if is_saved_scene(name, io.BytesIO(data)):
+            raise _no_mesh(name)
         return _checked(_read(kind, data, name, folder, real), name, real)
+
+
+def _no_mesh(name: str) -> ValueError:
+    return ValueError(f"{name}: is a scene that Scene.save wrote and no mesh: open it with wive.load(path)")
 
 
 def content_of(source: MeshSource) -> tuple[str, str | None, bytes]:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import html
-from collections.abc import Callable, Iterable
+import os
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,7 +17,7 @@ from wive._internal.cpu_tracer import CpuTracer
 from wive._internal.files import PathLike, file_name
 from wive._internal.heightfield import heightfield_mesh
 from wive._internal.host_arrays import host_array
-from wive._internal.lines import one_line
+from wive._internal.known_meshes import know_again, make_known
 from wive._internal.mesh_objects import MeshObject, PlacedMeshes, mesh_arrays
 from wive._internal.point_queries import PointQueries
 from wive._internal.precision import Floats, Precision, real_of
@@ -28,10 +29,10 @@ from wive._internal.storage import (
     Options,
     geom_offsets,
     geoms_of_offsets,
-    read_scene,
     refuse_newer,
     write_scene,
 )
+from wive._internal.stored_scenes import save_file, share, source_of
 from wive._internal.tracer import Tracer
 from wive.backend import resolve_backend
 from wive.geoms import Geoms, one_geom
@@ -99,26 +100,43 @@ class Scene(Queries, PointQueries):
             rounding, (vertices, faces) = "dtype=np.float32", mesh_arrays(vertices)
         given = host_array("vertices", vertices), host_array("faces", faces)
         mesh = arguments.mesh(*given, accuracy, dtype, rounding)
-        points, self._faces = map(arguments.read_only, mesh)
-        self._real = real_of(points.dtype, accuracy)
-        bvh = _cpu.Bvh(points, self._faces, accuracy, nodes=nodes, quality=quality)
-        self._tracer = _tracer(bvh, self._faces, found, place, geoms)
+        points, faces = map(arguments.read_only, mesh)
+        bvh = _cpu.Bvh(points, faces, accuracy, nodes=nodes, quality=quality)
+        self._take(tracer_of(bvh, faces, found, place, geoms), faces)
+
+    def _take(self, tracer: Tracer, faces: NDArray[np.int32]) -> None:
+        """Trace with this tracer from now on."""
+        vertices = tracer.bvh.vertices
+        source = tracer.bvh.source
+        make_known(vertices, faces, None if source is None else source.place)
+        self._real = real_of(vertices.dtype, tracer.bvh.accuracy)
+        self._tracer, self._faces = tracer, faces
 
     @classmethod
     def from_file(
         cls,
         source: MeshSource,
         *,
-        dtype: DTypeLike = np.float32,
+        dtype: DTypeLike | None = None,
         file_type: str | None = None,
         **kwargs: Any,
     ) -> Scene:
         """A scene from a mesh file, read by `wive.load_mesh`; other keywords are those of `Scene`.
 
-        Accuracy "exact" is that for the vertices rounded to `dtype`; with np.float64 it refuses files that
-        hold finer numbers than float32.
+        `dtype` is np.float32 if it is None. Accuracy "exact" is that for the vertices rounded to `dtype`;
+        with np.float64 it refuses files that hold finer numbers than float32.
+
+        The path of a file that `Scene.save` wrote is taken as well: keywords that are left out, and `dtype`
+        if it is None, are those of the saved scene. The tree in the file is used if the others agree with it,
+        else one is built over the mesh in the file.
         """
-        return cls(*load_mesh(source, dtype, file_type=file_type), **kwargs)
+        if file_type is None and isinstance(source, str | os.PathLike):
+            from wive.loading import from_saved, is_saved_file
+
+            if is_saved_file(source):
+                return from_saved(cls, source, dtype, kwargs)
+        mesh = load_mesh(source, np.float32 if dtype is None else dtype, file_type=file_type)
+        return cls(*mesh, **kwargs)
 
     @classmethod
     def from_meshes(cls, meshes: Iterable[MeshObject | Pair] | PlacedMeshes, **kwargs: Any) -> Scene:
@@ -171,6 +189,13 @@ class Scene(Queries, PointQueries):
         """
         return cls(*heightfield_mesh(z, x, y, kwargs.get("accuracy", "watertight")), **kwargs)
 
+    @classmethod
+    def _of_tracer(cls, tracer: Tracer, faces: NDArray[np.int32], options: Options) -> Scene:
+        scene = object.__new__(cls)
+        scene._options = options
+        scene._take(tracer, faces)
+        return scene
+
     def refit(self, vertices: ArrayLike, *, geom: int | None = None) -> None:
         """Move the vertices: new positions, the same faces.
 
@@ -195,14 +220,46 @@ class Scene(Queries, PointQueries):
         """
         given, tracer = host_array("vertices", vertices), self._tracer
         if geom is not None:
-            self._tracer = refitted_mesh(tracer, self._faces, self.geoms, geom, given, self._real)
-            return
-        points = arguments.moved_vertices(given, len(self.vertices), self._real)
-        self._tracer = tracer.refitted(arguments.read_only(points))
+            moved = refitted_mesh(tracer, self._faces, self.geoms, geom, given, self._real)
+        else:
+            points = arguments.moved_vertices(given, len(self.vertices), self._real)
+            moved = tracer.refitted(arguments.read_only(points))
+        self._take(moved, self._faces)
 
     def save(self, path: PathLike) -> None:
-        """Write the scene to a file that `wive.load` reads; the file is whole or absent."""
-        write_scene(path, self.vertices, self._faces, self._tracer.geoms, self._options)
+        """Write the scene to a file that `wive.load` opens at once; the file is whole or as it was.
+
+        The file holds nodes, leaves, mesh and options, some bytes more than `memory` and the mesh, whatever
+        its name; docs/saved_scenes.md has the format. If the name ends in .npz it holds the mesh and the
+        options alone, in NumPy's format, and loading builds the tree again.
+        """
+        bvh = self._bvh
+        if file_name(path).lower().endswith(".npz"):
+            write_scene(path, bvh.vertices, self._faces, self._tracer.geoms, self._options)
+        else:
+            save_file(path, bvh, self._faces, self._tracer.geoms, self._options)
+
+    def share(self) -> None:
+        """Move the tree and the mesh into shared memory, so that the scene pickles as its name.
+
+        Other processes of this machine that unpickle the scene, or its hits, then map this memory in
+        milliseconds. Nothing happens if the scene is shared already, or in a file that `load` opened.
+
+        This process frees the memory when it lets go of the scene, when `refit` replaces the tree, and when
+        it ends; if it is killed, Python's resource tracker does. Processes that have unpickled the scene
+        before then keep it, and so do hits. Processes forked from this one don't free it.
+
+        Raises MemoryError if there is not enough shared memory; Linux has it in /dev/shm.
+
+        >>> scene.share()
+        >>> with ProcessPoolExecutor() as pool:
+        ...     hits = list(pool.map(scene.intersect, origins, directions))  # one tree
+        """
+        tracer = self._tracer
+        if tracer.bvh.source is None:
+            bvh = share(tracer.bvh, self._faces, tracer.geoms, self._options)
+            faces = source_of(bvh).faces
+            self._take(tracer_of(bvh, faces, tracer.backend, tracer.device, tracer.geoms), faces)
 
     @property
     def vertices(self) -> Floats:
@@ -282,12 +339,34 @@ class Scene(Queries, PointQueries):
         except Exception:  # notebooks would print a traceback in place of the scene
             return html.escape(repr(self))
 
-    def __reduce__(self) -> tuple[Callable[..., Scene], tuple[Any, ...]]:
-        """Pickle the mesh and the options; unpickling builds the tree again."""
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickle where the tree is stored; else the mesh and the options, of which it is built again."""
+        source = self._bvh.source
+        if source is not None:
+            from wive.loading import reopened
+
+            return reopened, (source.place, self._options["backend"], self._options["device"])
         options: dict[str, Any] = {**self._options}
         if self._tracer.geoms is not None:
             options[GEOMS] = geom_offsets(self._tracer.geoms)
-        return _rebuild, (self.vertices, self._faces, options, FORMAT_VERSION)
+        token = make_known(self.vertices, self._faces, None)
+        return _rebuild, (self.vertices, self._faces, options, FORMAT_VERSION), {"_token": token}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Know the mesh by the name that the hits of the pickled scene have."""
+        know_again(self.vertices, self._faces, state["_token"])
+
+    def __copy__(self) -> Scene:
+        """A scene of the same tree; refitting one doesn't move the other."""
+        return self._of_tracer(self._tracer, self._faces, self._options)
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Scene:
+        """A scene over a copy of the mesh; a stored tree, which nobody can change, is shared."""
+        if self._bvh.source is not None:
+            return self.__copy__()
+        rebuild, (vertices, faces, *rest), _ = self.__reduce__()
+        scene: Scene = rebuild(vertices.copy(), faces.copy(), *rest)
+        return scene
 
     def _at_rest(self) -> Scene:
         """The scene as it is now, with the same tree, whatever refits come."""
@@ -300,33 +379,16 @@ class Scene(Queries, PointQueries):
         return self._tracer.bvh
 
 
-def _tracer(
+def tracer_of(
     bvh: _cpu.Bvh, faces: NDArray[np.int32], backend: str, device: str | None, geoms: Geoms | None
 ) -> Tracer:
+    """What traces with the tree, on a backend and a device that can be used."""
     if device is None:
         return CpuTracer(bvh, faces, backend, geoms)
     from wive.warp_kernels.scene.tracer import WarpTracer
 
     tracer: Tracer = WarpTracer(bvh, faces, device, geoms)
     return tracer
-
-
-def load(path: PathLike, *, backend: str | None = None, device: str | None = None) -> Scene:
-    """The scene in a file that `Scene.save` wrote, with the options it was made with.
-
-    `backend` or `device`, if given, replaces both saved ones: a scene saved with "avx512" or on "cuda:0"
-    opens with backend "auto" on a machine that lacks these.
-
-    Raises OSError if the file can't be read, ValueError if it is not a saved scene or its backend or device
-    can't be used here.
-    """
-    vertices, faces, geoms, options = read_scene(path)
-    if backend is not None or device is not None:
-        options["backend"], options["device"] = backend or "auto", device
-    try:
-        return Scene(Joined(vertices, faces, geoms), **options)
-    except (TypeError, ValueError) as error:
-        raise ValueError(f"{one_line(file_name(path))}: {error}") from error
 
 
 def _rebuild(vertices: Floats, faces: NDArray[np.int32], options: Any, version: int = 1) -> Scene:

@@ -9,6 +9,7 @@ import pytest
 from support.meshes import TRIANGLE, assert_same_hits, random_rays, soup, sphere
 
 import wive
+from wive._internal.tree_file import Image
 
 
 def test_pickled_scenes_and_hits_are_the_same(backend):
@@ -33,8 +34,9 @@ def test_saved_scenes_load_the_same(backend, tmp_path):
     assert wive.load(path, backend="scalar").backend == "scalar"
 
 
-def test_a_failed_save_leaves_the_old_file_and_nothing_else(tmp_path, monkeypatch):
-    path = tmp_path / "scene.wive"
+@pytest.mark.parametrize("name", ["scene.wive", "scene.npz"])
+def test_a_failed_save_leaves_the_old_file_and_nothing_else(tmp_path, monkeypatch, name):
+    path = tmp_path / name
     wive.Scene(*TRIANGLE).save(path)
     whole = path.read_bytes()
 
@@ -42,7 +44,12 @@ def test_a_failed_save_leaves_the_old_file_and_nothing_else(tmp_path, monkeypatc
         file.write(b"half")
         raise OSError("disk full")
 
+    def half_an_image(image):
+        yield b"half"
+        raise OSError("disk full")
+
     monkeypatch.setattr(np, "savez", half_written)
+    monkeypatch.setattr(Image, "pieces", half_an_image)
     with pytest.raises(OSError, match="disk full"):
         wive.Scene(*sphere(0)).save(path)
     assert path.read_bytes() == whole

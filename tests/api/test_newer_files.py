@@ -127,21 +127,16 @@ def test_pickles_from_before_versions_still_load():
 
 
 @pytest.mark.parametrize("name", ["scene.wive", "scene.npz", "scene", "scene.stl"])
-def test_a_saved_scene_where_a_mesh_is_expected_names_load(tmp_path, capsys, name):
+def test_a_saved_scene_where_a_mesh_is_expected_names_load(tmp_path, name):
     path = tmp_path / name
     wive.Scene(*TRIANGLE).save(path)
-    for read in (wive.load_mesh, wive.Scene.from_file):
+    for source in (path, path.read_bytes()):
         with pytest.raises(ValueError) as error:
-            read(path)
-        assert str(error.value) == (
-            f"{path}: is a scene that Scene.save wrote and no mesh: open it with wive.load(path)"
+            wive.load_mesh(source)
+        assert str(error.value).endswith(
+            ": is a scene that Scene.save wrote and no mesh: open it with wive.load(path)"
         )
-    np.save(tmp_path / "rays.npy", np.zeros((1, 6)))
-    for command in (["info", path], ["render", path], ["trace", path, tmp_path / "rays.npy", "-o", "x.npz"]):
-        assert main([str(part) for part in command]) == 2
-        printed = capsys.readouterr().err
-        assert "wive.load" in printed
-        assert printed.count("\n") == 1
+    assert len(wive.Scene.from_file(path)) == 1
 
 
 def test_a_mesh_with_a_header_of_its_own_is_a_mesh(tmp_path):

@@ -395,7 +395,7 @@ def test_wives_that_know_one_mesh_alone_refuse_several(tmp_path, monkeypatch):
     ],
 )
 def test_damaged_offsets_are_no_scene(tmp_path, offsets):
-    path = tmp_path / "scene.wive"
+    path = tmp_path / "scene.npz"
     wive.Scene.from_meshes([SPHERE, SPHERE]).save(path)
     with np.load(path) as file:
         arrays = dict(file)

@@ -91,20 +91,20 @@ def test_saved_and_pickled_scenes_keep_their_device(tmp_path, device):
 def test_a_scene_of_another_machines_device_opens_on_the_requested_one(
     tmp_path, monkeypatch, usable_backends
 ):
-    wive.Scene(*TRIANGLE, device="cpu").save(tmp_path / "warp")
-    with np.load(tmp_path / "warp") as arrays:
+    wive.Scene(*TRIANGLE, device="cpu").save(tmp_path / "warp.npz")
+    with np.load(tmp_path / "warp.npz") as arrays:
         content = dict(arrays)
     content["header"] = np.array(str(content["header"]).replace('"device": "cpu"', '"device": "cuda:0"'))
-    with open(tmp_path / "cuda", "wb") as file:
+    with open(tmp_path / "cuda.npz", "wb") as file:
         np.savez(file, **content)
     with pytest.raises(ValueError) as error:
-        wive.load(tmp_path / "cuda")
+        wive.load(tmp_path / "cuda.npz")
     assert message(error) == (
-        f"{tmp_path / 'cuda'}: device 'cuda:0' can't be used here ({NO_DRIVER}); choose one of cpu"
+        f"{tmp_path / 'cuda.npz'}: device 'cuda:0' can't be used here ({NO_DRIVER}); choose one of cpu"
     )
-    assert wive.load(tmp_path / "cuda", device="cpu").device == "cpu"
-    assert wive.load(tmp_path / "cuda", backend="auto").backend == usable_backends[0]
-    assert wive.load(tmp_path / "cuda", backend="scalar").device is None
+    assert wive.load(tmp_path / "cuda.npz", device="cpu").device == "cpu"
+    assert wive.load(tmp_path / "cuda.npz", backend="auto").backend == usable_backends[0]
+    assert wive.load(tmp_path / "cuda.npz", backend="scalar").device is None
 
 
 def test_backends_list_each_device_with_its_reason(monkeypatch):

@@ -29,6 +29,7 @@ from wive.backend import Backend, backends
 from wive.camera import Camera
 from wive.colors import load_colors
 from wive.hits import Hits
+from wive.loading import is_saved_file
 from wive.meshfile import load_mesh
 from wive.rendering import render_counted
 from wive.scene import Scene
@@ -57,7 +58,7 @@ def render_picture(options: Namespace) -> None:
     chosen = {field.name: getattr(options, field.name) for field in fields(Settings)}
     colours = chosen.pop("albedo")
     settings = Settings(**chosen)
-    scene = _scene(options, *(load_mesh(options.mesh) if options.mesh else terrain_mesh()))
+    scene = _scene_of(options, options.mesh)[0] if options.mesh else _scene(options, *terrain_mesh())
     if colours != "file":
         settings = replace(settings, albedo=colours)
     elif options.shading not in COLOURLESS:
@@ -77,10 +78,10 @@ def trace_rays(options: Namespace) -> None:
     output = check_output(options.output, ".npz", [options.mesh, options.rays])
     check_input(options.rays)
     refuse_part(check_input(options.mesh), output)
-    scene = _scene(options, *load_mesh(options.mesh, options.precision))
+    scene, _ = _scene_of(options, options.mesh)
     refuse_lacking(scene.backend, scene._tracer.lacks, {"threads": options.threads})
     origins, directions, tmin, tmax = _read_rays(
-        options.rays, real_named(options.precision), scene.accuracy == "exact"
+        options.rays, real_named(scene.precision), scene.accuracy == "exact"
     )
     count = len(origins)
     if not options.all and (options.touching or options.max_bytes is not None):
@@ -118,10 +119,7 @@ def trace_rays(options: Namespace) -> None:
 
 def describe_mesh(options: Namespace) -> None:
     """`wive info`: the mesh and the tree over it."""
-    vertices, faces = load_mesh(options.mesh, options.precision)
-    begin = time.perf_counter()
-    scene = _scene(options, vertices, faces)
-    seconds = time.perf_counter() - begin
+    scene, seconds = _scene_of(options, options.mesh)
     digits = "g" if scene.precision == "float32" else ".12g"
     low, high = (" ".join(f"{value:{digits}}" for value in corner) for corner in scene.bounds)
     tree = scene._bvh
@@ -141,7 +139,7 @@ def describe_mesh(options: Namespace) -> None:
             f"{node_cost + triangle_cost:.2f} ({node_cost:.2f} nodes, {triangle_cost:.2f} triangles)",
         ),
         ("memory", f"{scene.memory:,} bytes ({scene.memory / len(scene):.1f} per triangle)"),
-        ("build", f"{seconds:.3f} s"),
+        ("build" if scene._bvh.source is None else "load", f"{seconds:.3f} s"),
     ):
         print(f"{name:<10} {value}")
 
@@ -154,15 +152,29 @@ def list_backends(options: Namespace) -> None:
             print(f"  {device:<7} {_usable(found)}")
 
 
+def _scene_of(options: Namespace, path: str) -> tuple[Scene, float]:
+    """The scene of a mesh file or a saved scene, and the seconds that its tree took."""
+    precision = getattr(options, "precision", None)
+    if is_saved_file(path):
+        begin = time.perf_counter()
+        scene = Scene.from_file(path, dtype=precision, **_given(options))
+        scene._bvh.verify()
+    else:
+        mesh = load_mesh(path, precision or "float32")
+        begin = time.perf_counter()
+        scene = _scene(options, *mesh)
+    return scene, time.perf_counter() - begin
+
+
 def _scene(options: Namespace, vertices: NDArray[Any], faces: NDArray[Any]) -> Scene:
-    return Scene(
-        vertices,
-        faces,
-        backend=options.backend,
-        device=options.device,
-        accuracy=options.accuracy,
-        nodes=options.nodes,
-    )
+    return Scene(vertices, faces, **_given(options))
+
+
+def _given(options: Namespace) -> dict[str, Any]:
+    """The options of `Scene` that the user gave."""
+    names = ("backend", "device", "accuracy", "nodes")
+    given = {name: getattr(options, name) for name in names}
+    return {name: value for name, value in given.items() if value is not None}
 
 
 def _usable(backend: Backend) -> str:

@@ -1,7 +1,6 @@
-"""A scene as one file: its mesh and its options. Loading builds the tree again, bit for bit the same."""
+"""A scene as an npz file: its mesh and its options. Loading builds the tree again, bit for bit the same."""
 
-import io
-from typing import Any, TypedDict
+from typing import IO, Any, TypedDict
 
 import numpy as np
 from numpy.typing import NDArray
@@ -112,38 +111,40 @@ def read_scene(path: PathLike) -> tuple[Floats, NDArray[np.int32], Geoms | None,
     return vertices, faces, geoms, options
 
 
-def refuse_newer(what: str, version: int, options: object, writer: object = None) -> None:
+def refuse_newer(
+    what: str, version: int, options: object, writer: object = None, known: int = FORMAT_VERSION
+) -> None:
     """Raise ValueError if `what` is of a version, or has options, that only a newer wive knows.
 
-    writer: the version of wive that wrote it, if that is known.
+    writer: the version of wive that wrote it, if that is known. known: the latest that this one reads.
     """
     import wive
 
     unknown = ", ".join(sorted(map(str, options.keys() - OPTIONS))) if isinstance(options, dict) else ""
-    if version <= FORMAT_VERSION and not unknown:
+    if version <= known and not unknown:
         return
-    is_newer = version > FORMAT_VERSION
+    is_newer = version > known
     found = f"of version {version!s:.40}" if is_newer else f"with unknown options ({one_line(unknown):.100})"
     by = f"wive {one_line(writer):.40}" if isinstance(writer, str) else "a newer wive"
     raise ValueError(
         f"{what} {found}, written by {by}; this is wive {wive.__version__}, "
-        f"which reads version {FORMAT_VERSION}: upgrade wive, or save the scene again with this one"
+        f"which reads version {known}: upgrade wive, or save the scene again with this one"
     )
 
 
-def refuse_saved_scene(name: str, data: bytes) -> None:
-    """Raise ValueError if the content of a file is a saved scene, where a mesh is expected."""
-    if not data.startswith(ZIP):
-        return
+def is_saved_scene(name: str, file: IO[bytes]) -> bool:
+    """Whether an open file is a saved scene in NumPy's format; ValueError if it is of a newer version."""
+    is_zip = file.read(len(ZIP)) == ZIP
+    file.seek(0)
+    if not is_zip:
+        return False
     try:
-        header = _header(Npz(io.BytesIO(data), name, "a scene saved by wive")[HEADER])
+        header = _header(Npz(file, name, "a scene saved by wive")[HEADER])
     except (KeyError, ValueError):  # another archive, or damaged: the reader of meshes says so
-        return
+        return False
     if header is not None:
         _refuse_newer_file(name, header)
-        raise ValueError(
-            f"{name}: is a scene that Scene.save wrote and no mesh: open it with wive.load(path)"
-        )
+    return header is not None
 
 
 def _header(array: NDArray[Any]) -> dict[str, Any] | None:
