@@ -69,8 +69,7 @@ def row_of(
     few = points[:: max(1, count // 50)]
     for library, make, some in (("open3d", open3d_query, points), ("trimesh", trimesh_query, few)):
         theirs = make(vertices, faces, some)
-        if theirs is not None:
-            row[library] = compare(ours(some), timed(theirs), effort).ratio
+        row[library] = None if theirs is None else compare(ours(some), timed(theirs), effort).ratio
     return row
 
 

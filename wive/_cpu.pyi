@@ -371,9 +371,13 @@ def nearest_ahead(
     center: Sequence[float],
     far: float,
     most: float,
+    before: float,
     threads: int = 0,
 ) -> NDArray[np.float64]:
-    """(n,3) where rays farther than far from center come nearest to it, if that lies ahead; or origins."""
+    """(n,3) where rays farther than far from center are, the length `before` they come nearest to it.
+
+    The origins of other rays, and of those that have the center behind.
+    """
 
 def between(
     vertices: NDArray[Real],

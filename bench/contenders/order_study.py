@@ -90,6 +90,7 @@ def _kernels(kernel: str) -> ctypes.CDLL:
         flags += ["-O3", *AVX512, *(["-fira-region=one"] if gcc else [])]
     else:
         flags += ["-O2", "-fpeel-loops"] if gcc else ["-O3"]
-    sources = [STUDY / "kernels_distance.cpp", CPU / "kernels" / "trace.cpp", CPU / "core" / "memory.cpp"]
+    sources = [STUDY / "kernels_distance.cpp", CPU / "kernels" / "trace.cpp"]
+    sources += [CPU / "core" / f"{name}.cpp" for name in ("control_groups", "memory", "poll", "thread_count")]
     sources.append(CPU / "traverse" / "scaled_limits.cpp")
     return ctypes.CDLL(str(compiled(*sources, flags=flags, headers=[CPU, STUDY])))

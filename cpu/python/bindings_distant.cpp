@@ -30,11 +30,11 @@ struct Distance {
         return std::isfinite(along) ? along : 0;
     }
 
-    // Where the ray is after `step`. That and the sum are rounded to 1e-16 of the way, which may be more than the size
-    // of the scene: so the sum is moved along the ray once more.
-    Double3 start(Double3 origin, Double3 direction, double step) const {
+    // Where the ray is after `step`, less the length `before`. The step and the sum are rounded to 1e-16 of the way,
+    // which may be more than the size of the scene: so the sum is moved along the ray once more.
+    Double3 start(Double3 origin, Double3 direction, double step, double before = 0) const {
         const Double3 unit = direction / direction.abs().max(), near = origin + direction * step;
-        return near + unit * to_nearest(near, unit);
+        return near + unit * (to_nearest(near, unit) - before / std::sqrt(Double3::dot(unit, unit)));
     }
 
 private:
@@ -110,9 +110,11 @@ py::object bring_near(const Array<double>& origins, const Array<double>& directi
     return py::make_tuple(std::move(near), std::move(low), std::move(high), std::move(steps));
 }
 
-// Where rays are that start far away when they come nearest to the centre, if that lies ahead; the others' origins.
+// Where rays are that start far away `before` they come nearest to the centre, a length, if that lies ahead; the
+// others' origins.
 Array<double> nearest_ahead(const Array<double>& origins, const Array<double>& directions,
-                            const std::array<double, 3>& center, double far, double most, unsigned threads) {
+                            const std::array<double, 3>& center, double far, double most, double before,
+                            unsigned threads) {
     expect_shape(origins, 3, "origins: expected shape (n, 3)");
     expect(directions.size() == origins.size(), "directions: expected as many as origins");
     auto near = make_rows<double>(origins.shape(0));
@@ -123,7 +125,7 @@ Array<double> nearest_ahead(const Array<double>& origins, const Array<double>& d
         for (std::size_t i = begin; i < end; ++i) {
             const Double3 origin = Double3::load(from + 3 * i), direction = Double3::load(along + 3 * i);
             const double step = distance.step(origin, direction);
-            (step > 0 ? distance.start(origin, direction, step) : origin).store(out + 3 * i);
+            (step > 0 ? distance.start(origin, direction, step, before) : origin).store(out + 3 * i);
         }
     });
     return near;
@@ -136,7 +138,7 @@ void bind_distant(py::module_& m) {
           array_arg("rounded_directions"), array_arg("tmin"), array_arg("tmax"), py::arg("center"), py::arg("far"),
           py::arg("most"), py::arg("kept"), py::arg("threads") = 0);
     m.def("nearest_ahead", &nearest_ahead, array_arg("origins"), array_arg("directions"), py::arg("center"),
-          py::arg("far"), py::arg("most"), py::arg("threads") = 0);
+          py::arg("far"), py::arg("most"), py::arg("before"), py::arg("threads") = 0);
 }
 
 }  // namespace wive

@@ -76,7 +76,7 @@ def launch_closest_points(
     launch(
         make_closest_kernel(tree.accuracy, tree.stack, tree.nodes, tree.precision),
         len(points),
-        [tree.handle, points, max_distance],
+        [tree.batch_handle, points, max_distance],
         [distance, prim, uv],
         device=tree.device,
         stream=stream,

@@ -58,10 +58,13 @@ class Ball(NamedTuple):
             lowest, highest = origins.min(), origins.max()
         return not (self.lowest <= lowest and highest <= self.highest)
 
-    def nearest_ahead(self, origins: Float64, directions: Float64, threads: int = 0) -> Float64:
-        """(n,3) where rays that start far away come nearest to the center, if that lies ahead; or origins."""
-        most = float(np.finfo(np.float64).max)
-        return _cpu.nearest_ahead(origins, directions, self.center.tolist(), self.far, most, threads)
+    def just_before(self, origins: Float64, directions: Float64) -> Float64:
+        """(n,3) where rays that start far away are two radii before they come nearest to the center.
+
+        The origin of a ray that starts near, or that has the center behind.
+        """
+        most, before = float(np.finfo(np.float64).max), 2 * self.far / FAR
+        return _cpu.nearest_ahead(origins, directions, self.center.tolist(), self.far, most, before)
 
 
 class Moved(NamedTuple):

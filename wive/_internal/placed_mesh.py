@@ -83,7 +83,7 @@ class PlacedMesh:
         """The origins of rays, those far away moved along their rays to where the mesh is near."""
         if not self._ball.may_have_far(origins):
             return origins
-        return self._ball.nearest_ahead(origins, directions)
+        return self._ball.just_before(origins, directions)
 
     def rays(self, origins: Float64, directions: Float64) -> tuple[Floats, Floats]:
         """The rays in the scene's units and dtype."""

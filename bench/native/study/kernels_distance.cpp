@@ -27,7 +27,7 @@ extern "C" void WIVE_NAME(WIVE_ISA)(const std::byte* units, const float* center,
                                     std::size_t count, float* t, std::int32_t* prim, float* uv, std::int32_t* stats,
                                     unsigned in_flight) {
     using namespace wive;
-    BvhView bvh = {units, {}, {}};
+    BvhView bvh = {units, {}, {}, 0};
     for (int axis = 0; axis < 3; ++axis) {
         bvh.center[axis] = center[axis];
         bvh.extent[axis] = extent[axis];
