@@ -128,7 +128,7 @@ def test_false_sizes_methods_and_checksums_of_an_archive_are_refused():
 
 
 def test_a_scene_file_with_false_claims_is_refused(tmp_path):
-    path = tmp_path / "scene"
+    path = tmp_path / "scene.npz"
     wive.Scene(VERTICES, FACES).save(path)
     with np.load(path) as saved:
         header = npy(saved["header"])
