@@ -188,7 +188,8 @@ double WindingTable<Real>::round_point(const double* point) const {
     while (top > 0) {
         const std::int32_t number = stack[--top];
         if (number < 0) {
-            angles += round_leaf(static_cast<std::size_t>(~number), point);
+            const std::int32_t leaf = ~number;
+            angles += round_leaf(static_cast<std::size_t>(leaf), point);
             continue;
         }
         const Node& node = nodes_[static_cast<std::size_t>(number)];

@@ -67,6 +67,18 @@ ForeignTracer foreign_tracer(const std::optional<std::pair<std::uintptr_t, std::
             reinterpret_cast<const void*>(addresses->second)};
 }
 
+Light light_of(const Array<float>& rows) {
+    expect(rows.ndim() == 2 && rows.shape(0) == 5 && rows.shape(1) == 3, "light: expected shape (5, 3)");
+    const auto row = [&](py::ssize_t i) { return load_vec3(rows.data(i, 0)); };
+    return {row(0), row(1), row(2), row(3), row(4)};
+}
+
+const float* colours_of(const Array<float>& rows, std::size_t count) {
+    expect(rows.ndim() == 2 && rows.shape(1) == 3 && static_cast<std::size_t>(rows.shape(0)) == count,
+           "colours: expected shape (f, 3) or (v, 3)");
+    return rows.data();
+}
+
 std::uint64_t render(const PyBvh& self, const KernelArg& kernel, const Array<float>& camera, Array<float> image,
                      int row_begin, int row_end, int samples, int bounces, const std::string& albedo,
                      std::uint32_t seed, unsigned threads, unsigned in_flight,
@@ -83,13 +95,7 @@ std::uint64_t render(const PyBvh& self, const KernelArg& kernel, const Array<flo
     const bool has_colours = surface == Albedo::of_faces || surface == Albedo::of_vertices;
     const std::size_t colour_count = surface == Albedo::of_faces ? mesh.face_count : mesh.vertex_count;
     expect(has_colours == colours.has_value(), "colours: expected with albedo 'faces' and 'vertices' alone");
-    expect(!has_colours || (colours->ndim() == 2 && colours->shape(1) == 3 &&
-                            static_cast<std::size_t>(colours->shape(0)) == colour_count),
-           "colours: expected shape (f, 3) or (v, 3)");
-    expect(!light || (light->ndim() == 2 && light->shape(0) == 5 && light->shape(1) == 3),
-           "light: expected shape (5, 3)");
     const auto row = [&](py::ssize_t i) { return load_vec3(camera.data(i, 0)); };
-    const auto of_light = [&](py::ssize_t i) { return load_vec3(light->data(i, 0)); };
     const RenderJob job = {self.bvh().view(),
                            mesh,
                            table_of<float>(kernel),
@@ -105,8 +111,8 @@ std::uint64_t render(const PyBvh& self, const KernelArg& kernel, const Array<flo
                            image.mutable_data(),
                            in_flight,
                            foreign_tracer(tracer),
-                           light ? Light{of_light(0), of_light(1), of_light(2), of_light(3), of_light(4)} : white_sky,
-                           has_colours ? colours->data() : nullptr};
+                           light ? light_of(*light) : white_sky,
+                           colours ? colours_of(*colours, colour_count) : nullptr};
     const Released released;
     if (check) {  // the arrays are the caller's, who may have changed them since the tree was built
         Threads checkers(thread_count(threads));

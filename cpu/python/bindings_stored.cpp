@@ -64,12 +64,14 @@ Checksums PyBvh::checksums() const {
 
 // Several threads may do this at once. There is no lock that a process which forks meanwhile would find taken.
 void PyBvh::verify() const {
+    if (!stored_) return;
+    const Stored& stored = *stored_;
     const Checksums found = checksums();
     const auto expect_good = [&](bool good, const std::string& fault) {
-        if (!good) throw std::invalid_argument(stored_->name + ": is damaged (" + fault + ")");
+        if (!good) throw std::invalid_argument(stored.name + ": is damaged (" + fault + ")");
     };
     for (std::size_t i = 0; i < found.size(); ++i)
-        expect_good(found[i] == stored_->checksums[i], std::string("wrong checksum of its ") + parts[i]);
+        expect_good(found[i] == stored.checksums[i], std::string("wrong checksum of its ") + parts[i]);
     std::visit(
         [&]<class Real>(const Array<Real>&) {
             const Mesh<Real> view = mesh<Real>();
