@@ -48,7 +48,7 @@ struct Interval<double> {
         tmax = t;
         tmax_above = float_above(t - box_start);
     }
-    void start_boxes_at(double t) {
+    [[gnu::always_inline]] void start_boxes_at(double t) {
         box_start = t;
         tmin_below = float_below(tmin - t);
         tmax_above = float_above(tmax - t);
