@@ -324,11 +324,13 @@ class Scene(Queries, PointQueries):
         return len(self._faces)
 
     def __repr__(self) -> str:
-        """Size and options."""
+        """Size and options, and where the tree is stored if it is."""
         options = f"backend={self.backend!r}, accuracy={self.accuracy!r}, precision={self.precision!r}"
         geoms = self._tracer.geoms
         several = "" if geoms is None else f" in {len(geoms)} meshes"
-        return f"Scene({len(self)} triangles{several}, {options})"
+        source = self._bvh.source
+        stored = "" if source is None else f", {source.place.described}"
+        return f"Scene({len(self)} triangles{several}, {options}{stored})"
 
     def _repr_html_(self) -> str:
         """What notebooks show: a small picture, if there is Pillow, and the scene's numbers."""

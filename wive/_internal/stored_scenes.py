@@ -28,6 +28,12 @@ class Place(NamedTuple):
     name: str
     digest: str
 
+    @property
+    def described(self) -> str:
+        """Where that is, in one line."""
+        how = "wive.load" if self.kind == "file" else self.kind
+        return f"{how}({one_line(self.name)!r})"
+
     def open(self) -> _cpu.Bvh:
         """The tree; OSError if it is not there, ValueError if it has changed."""
         try:
