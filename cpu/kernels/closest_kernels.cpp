@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "core/parallel.h"
+#include "kernels/share_runs.h"
 
 namespace wive {
 namespace {
@@ -28,11 +29,10 @@ template const ClosestKernels<double>* find_closest_kernels(IsaName);
 template <class Real>
 void find_closest_points(FindClosest<Real> kernel, const BvhView& bvh, const PointBatch<Real>& points,
                          const ClosestBatch<Real>& out, std::size_t count, unsigned threads) {
-    std::size_t next = 0;
-    const RaySource source = {&next, count, points_per_run};
     const std::size_t runs = (count + points_per_run - 1) / points_per_run;
     const unsigned workers = runs <= 1 ? 1 : static_cast<unsigned>(std::min<std::size_t>(runs, thread_count(threads)));
-    parallel_for(workers, workers, [&](std::size_t) { kernel(bvh, points, out, source); });
+    share_runs(count, points_per_run, workers,
+               [&](std::size_t, const RaySource& source) { kernel(bvh, points, out, source); });
 }
 
 template void find_closest_points(FindClosest<float>, const BvhView&, const PointBatch<float>&,

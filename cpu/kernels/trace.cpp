@@ -4,6 +4,7 @@
 
 #include "core/large_array.h"
 #include "core/parallel.h"
+#include "kernels/share_runs.h"
 #include "traverse/hit_list.h"
 
 namespace wive {
@@ -29,21 +30,12 @@ void trace(const KernelTable<Real>& table, TraceBatch<Real> kernel, const BvhVie
     if (in_flight == 0) in_flight = count < fewest_in_flight ? 1 : usual_in_flight;
     in_flight = std::min<unsigned>(in_flight, max_in_flight);
     in_flight = static_cast<unsigned>(std::min<std::size_t>(in_flight, count));
-    std::size_t next = 0;
-    const RaySource source = {&next, count, rays_per_run};
-    const auto work = [&](std::size_t worker) {
+    share_runs(count, rays_per_run, worker_count(count, threads), [&](std::size_t worker, const RaySource& source) {
         LargeArray<std::byte> scratch(in_flight > 1 ? in_flight * table.flight_bytes : 0);
         HitBatch<Real> own = hits;
         if (own.found) own.found += worker;
-        try {
-            kernel(bvh, rays, own, source, in_flight, scratch.data());  // -> trace_batch() in traverse/in_flight.h
-        } catch (...) {
-            __atomic_store_n(&next, count, __ATOMIC_RELAXED);  // no thread takes more rays
-            throw;
-        }
-    };
-    const unsigned workers = worker_count(count, threads);
-    parallel_for(workers, workers, work);
+        kernel(bvh, rays, own, source, in_flight, scratch.data());  // -> trace_batch() in traverse/in_flight.h
+    });
 }
 
 template void trace(const KernelTable<float>&, TraceBatch<float>, const BvhView&, const RayBatch<float>&,

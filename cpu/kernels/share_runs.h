@@ -1,0 +1,27 @@
+// Batches of rays or points on several threads.
+#pragma once
+
+#include <cstddef>
+
+#include "core/parallel.h"
+#include "core/ray.h"
+
+namespace wive {
+
+// Calls work(worker, source) on so many threads, which take [0, count) in runs from the source. If one of them throws,
+// as when the caller ends the work, the others take no more.
+template <class Work>
+void share_runs(std::size_t count, std::size_t run, unsigned workers, const Work& work) {
+    std::size_t next = 0;
+    const RaySource source = {&next, count, run};
+    parallel_for(workers, workers, [&](std::size_t worker) {
+        try {
+            work(worker, source);
+        } catch (...) {
+            __atomic_store_n(&next, count, __ATOMIC_RELAXED);
+            throw;
+        }
+    });
+}
+
+}  // namespace wive
