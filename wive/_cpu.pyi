@@ -345,6 +345,9 @@ def segment_rays(
     A ray starts at the end that is nearer to center (3,), so a segment and its reverse are one ray.
     """
 
+def may_have_far(origins: NDArray[Any], center: Sequence[float], far: float) -> bool:
+    """Whether an origin (n,3), float32 or float64, may differ from center by more than far on some axis."""
+
 def bring_near(
     origins: NDArray[Any],
     directions: NDArray[Any],

@@ -9,14 +9,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wive._internal.known_meshes import OfMesh, mesh_attributes
+from wive._internal.known_meshes import OfMesh
 from wive._internal.precision import Floats
-from wive._internal.wrapping import Wrapping, from_home
+from wive._internal.wrapping import Wrapping, from_home, keep_wrapped, library_name
 from wive.geoms import Geoms
-from wive.hits import geoms_of, surface_normals, surface_points
+from wive.hits import OnTriangles
 
 
-class AllHits(OfMesh):
+class AllHits(OnTriangles, OfMesh):
     """All hits of n rays, h in all: ray by ray, each ray's by ascending t, at equal t by ascending prim.
 
     Arrays are NumPy's if the rays were, else of the library and on the device that the rays came in;
@@ -67,24 +67,6 @@ class AllHits(OfMesh):
         """(h,) int64 ray of each hit; computed at each call."""
         return np.repeat(np.arange(len(self), dtype=np.int64), np.diff(self.offsets))
 
-    @property
-    def geom(self) -> NDArray[np.int32]:
-        """(h,) int32, the mesh of each hit, as `Hits.geom`; computed when read."""
-        return geoms_of(self).of(self.prim)
-
-    @property
-    def geom_prim(self) -> NDArray[np.int32]:
-        """(h,) int32, the row of each hit in the faces of its own mesh, as `Hits.geom_prim`."""
-        return geoms_of(self).within(self.prim)
-
-    def points(self) -> NDArray[np.float64]:
-        """(h,3) float64 hit points from the barycentrics, as `Hits.points`; computed at each call."""
-        return surface_points(self.vertices, self.faces, self.prim, self.uv)
-
-    def normals(self) -> NDArray[np.float64]:
-        """(h,3) float64 unit normals by the right-hand winding, as `Hits.normals`; computed at each call."""
-        return surface_normals(self.vertices, self.faces, self.prim)
-
     def __len__(self) -> int:
         """Number of rays."""
         return len(self.offsets) - 1
@@ -114,9 +96,7 @@ class WrappedAllHits(AllHits):
 
     def __init__(self, home: Any, wrapping: Wrapping) -> None:
         """Wrap the arrays of `home`, an `AllHits` or a `WarpAllHits`; all else is computed when used."""
-        offsets, t, prim, uv = map(wrapping.wrap, (home.offsets, home.t, home.prim, home.uv))
-        vars(self).update(offsets=offsets, t=t, prim=prim, uv=uv)
-        vars(self).update(mesh_attributes(home), _home=home, _wrapping=wrapping)
+        keep_wrapped(self, home, wrapping, "offsets", "t", "prim", "uv")
 
     counts = from_home(AllHits.counts)
     ray = from_home(AllHits.ray)
@@ -136,8 +116,8 @@ class WrappedAllHits(AllHits):
 
     def __repr__(self) -> str:
         """Number of rays and of hits, and the library of their arrays."""
-        library = type(self.t).__module__.partition(".")[0]
-        return f"AllHits({len(self)} rays, {self._home.t.shape[0]} hits, in arrays of {library})"
+        hits = self._home.t.shape[0]
+        return f"AllHits({len(self)} rays, {hits} hits, in arrays of {library_name(self.t)})"
 
 
 def row_of(i: int, count: int) -> int:

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wive._internal.known_meshes import OfMesh, mesh_attributes
+from wive._internal.known_meshes import OfMesh
 from wive._internal.precision import Floats
-from wive._internal.wrapping import Wrapping, from_home
+from wive._internal.wrapping import Wrapping, from_home, keep_wrapped, library_name
 from wive.geoms import Geoms
 from wive.hits import OnSurface
 
@@ -62,9 +62,7 @@ class WrappedClosest(Closest):
 
     def __init__(self, home: Any, wrapping: Wrapping) -> None:
         """Wrap distance, prim and uv of `home`; all else is computed when used."""
-        distance, prim, uv = map(wrapping.wrap, (home.distance, home.prim, home.uv))
-        vars(self).update(distance=distance, prim=prim, uv=uv, _geoms=None)
-        vars(self).update(mesh_attributes(home), _home=home, _wrapping=wrapping)
+        keep_wrapped(self, home, wrapping, "distance", "prim", "uv")
 
     mask = from_home(Closest.mask)
     geom = from_home(Closest.geom)
@@ -76,5 +74,5 @@ class WrappedClosest(Closest):
     def __repr__(self) -> str:
         """Number of points, and the library of the arrays."""
         shape = tuple(self.prim.shape)
-        kind = type(self.prim).__module__.partition(".")[0]
-        return f"Closest({shape[0] if len(shape) == 1 else shape} points, in arrays of {kind})"
+        count = shape[0] if len(shape) == 1 else shape
+        return f"Closest({count} points, in arrays of {library_name(self.prim)})"

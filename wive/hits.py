@@ -14,12 +14,12 @@ from wive._internal.distant import Moved
 from wive._internal.error_bounds import t_error_bounds
 from wive._internal.host_arrays import host_array
 from wive._internal.interpolation import interpolated, vertex_values_of
-from wive._internal.known_meshes import OfMesh, mesh_attributes, mesh_sizes
+from wive._internal.known_meshes import OfMesh, mesh_sizes
 from wive._internal.precision import FLOAT64, Floats, real_of
 from wive._internal.rays import Rays
 from wive._internal.sides import cosines_of, meets_front
 from wive._internal.spawn import spawn_origins
-from wive._internal.wrapping import Wrapping, from_home
+from wive._internal.wrapping import Wrapping, from_home, keep_wrapped, library_name
 from wive.geoms import Geoms, one_geom
 
 
@@ -63,19 +63,14 @@ def geoms_of(hits: InMeshes) -> Geoms:
     return hits._geoms or one_geom(*mesh_sizes(hits))
 
 
-class OnSurface:
+class OnTriangles:
     """Places on triangles of a mesh: `prim` (n,), -1 for none, and `uv` (n,2)."""
 
     prim: NDArray[np.int32]
     uv: Floats
     vertices: Floats
     faces: NDArray[np.int32]
-    _geoms: Geoms | None
-
-    @property
-    def mask(self) -> NDArray[np.bool_]:
-        """(n,) bool, true if there is a triangle: the ray hit something, or a point is close to it."""
-        return self.prim >= 0
+    _geoms: Geoms | None = None
 
     @property
     def geom(self) -> NDArray[np.int32]:
@@ -107,6 +102,15 @@ class OnSurface:
         Computed at each call. The normal is the triangle's, whichever side the ray or point came from.
         """
         return surface_normals(self.vertices, self.faces, self.prim)
+
+
+class OnSurface(OnTriangles):
+    """Places of which some are on no triangle."""
+
+    @property
+    def mask(self) -> NDArray[np.bool_]:
+        """(n,) bool, true if there is a triangle: the ray hit something, or a point is close to it."""
+        return self.prim >= 0
 
     def interpolate(self, vertex_values: ArrayLike) -> Floats:
         """Values given at the vertices, at the points hit: (1-u-v) a + u b + v c; NaN on a miss.
@@ -266,9 +270,8 @@ class WrappedHits(Hits):
 
     def __init__(self, home: Any, wrapping: Wrapping) -> None:
         """Wrap t, prim and uv of `home`, a `Hits` or a `WarpHits`; all else is computed when used."""
-        t, prim, uv = map(wrapping.wrap, (home.t, home.prim, home.uv))
-        vars(self).update(t=t, prim=prim, uv=uv, _rays=None, _accuracy="", _moved=None, _geoms=None)
-        vars(self).update(mesh_attributes(home), _home=home, _wrapping=wrapping)
+        keep_wrapped(self, home, wrapping, "t", "prim", "uv")
+        vars(self).update(_rays=None, _accuracy="", _moved=None)
 
     mask = from_home(Hits.mask)
     geom = from_home(Hits.geom)
@@ -287,4 +290,4 @@ class WrappedHits(Hits):
 
     def __repr__(self) -> str:
         """Number of rays, and the library of their hits."""
-        return f"Hits({len(self)} rays, in arrays of {type(self.t).__module__.partition('.')[0]})"
+        return f"Hits({len(self)} rays, in arrays of {library_name(self.t)})"

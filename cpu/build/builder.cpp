@@ -8,7 +8,6 @@
 
 #include "build/binary_tree.h"
 #include "build/emit.h"
-#include "build/far_away.h"
 #include "build/reinsertion.h"
 #include "build/write_node.h"
 #include "core/ensure.h"
@@ -121,34 +120,6 @@ BvhView Bvh::view() const {
             {facts_.center[0], facts_.center[1], facts_.center[2], 0},
             {facts_.extent[0], facts_.extent[1], facts_.extent[2], 0},
             facts_.far_away};
-}
-
-// Beyond 256 radii, float32 moves a ray by up to 1e-4 radii, which may be more than a typical triangle's size before.
-// Coordinates of the scene themselves are rounded by as much as distances up to those of its middle.
-double Bvh::far_distance() const {
-    const auto& [low, high] = facts_.bounds;
-    const double radius = 0.5 * std::hypot(high[0] - low[0], high[1] - low[1], high[2] - low[2]);
-    if (!(radius < std::numeric_limits<double>::infinity())) return std::numeric_limits<double>::infinity();
-    double distance = std::clamp<double>(facts_.far_away, 2 * radius, 256 * radius);
-    for (std::size_t axis = 0; axis < 3; ++axis)
-        distance = std::max(distance, std::abs(0.5 * low[axis] + 0.5 * high[axis]));
-    return distance;
-}
-
-bool Bvh::may_have_far(const float* origins, std::size_t count) const {
-    const auto& [low, high] = facts_.bounds;
-    constexpr double infinity = std::numeric_limits<double>::infinity();
-    double lowest = -infinity, highest = infinity;
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-        const double middle = 0.5 * low[axis] + 0.5 * high[axis];
-        lowest = std::max(lowest, middle - far_distance());
-        highest = std::min(highest, middle + far_distance());
-    }
-    const float least = static_cast<float>(lowest), most = static_cast<float>(highest);
-    unsigned beyond = 0;  // no early end, so that the loop runs on vectors
-    for (std::size_t i = 0; i < 3 * count; ++i)
-        beyond |= static_cast<unsigned>(origins[i] <= least) | static_cast<unsigned>(origins[i] >= most);
-    return beyond != 0;
 }
 
 template <class StoredNode>

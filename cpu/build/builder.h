@@ -7,6 +7,7 @@
 #include <span>
 #include <utility>
 
+#include "build/far_away.h"
 #include "build/mesh.h"
 #include "core/box.h"
 #include "core/compressed.h"
@@ -57,11 +58,7 @@ public:
     std::unique_ptr<Bvh> refitted(const Mesh<Real>& mesh, unsigned threads) const;
 
     BvhView view() const;
-    // The distance from the middle of the bounds beyond which float32 moves rays by too much: they are brought nearer
-    // before they are traced (wive/_internal/distant.py).
-    double far_distance() const;
-    // Whether an origin (n, 3) may be farther away.
-    bool may_have_far(const float* origins, std::size_t count) const;
+    Distant distant() const { return distant_from(facts_.bounds, facts_.far_away); }
     std::size_t bytes() const { return units_.size(); }
     std::span<const std::byte> units() const { return units_; }
     // The stored bytes of all nodes and of all blocks. Compressed blocks have two sizes (see CompressedBlock).

@@ -39,4 +39,32 @@ float far_away_from(const Mesh<Real>& mesh) {
 template float far_away_from(const Mesh<float>&);
 template float far_away_from(const Mesh<double>&);
 
+// Beyond 256 radii, float32 moves a ray by up to 1e-4 radii, which may be more than a typical triangle's size before.
+// Coordinates of the scene themselves are rounded by as much as distances up to those of its middle.
+Distant distant_from(const Bounds& bounds, float far_away) {
+    const auto& [low, high] = bounds;
+    constexpr double infinity = std::numeric_limits<double>::infinity();
+    const double radius = 0.5 * std::hypot(high[0] - low[0], high[1] - low[1], high[2] - low[2]);
+    if (!(radius < infinity)) return {{}, infinity};
+    Distant distant = {{}, std::clamp<double>(far_away, 2 * radius, 256 * radius)};
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+        distant.center[axis] = 0.5 * low[axis] + 0.5 * high[axis];
+        distant.far = std::max(distant.far, std::abs(distant.center[axis]));
+    }
+    return distant;
+}
+
+template <class Real>
+bool Distant::may_hold(const Real* origins, std::size_t count) const {
+    const auto [least, most] = std::minmax({center[0], center[1], center[2]});
+    const auto lowest = static_cast<Real>(most - far), highest = static_cast<Real>(least + far);
+    unsigned beyond = 0;  // no early end, so that the loop runs on vectors
+    for (std::size_t i = 0; i < 3 * count; ++i)
+        beyond |= static_cast<unsigned>(origins[i] <= lowest) | static_cast<unsigned>(origins[i] >= highest);
+    return beyond != 0;
+}
+
+template bool Distant::may_hold(const float*, std::size_t) const;
+template bool Distant::may_hold(const double*, std::size_t) const;
+
 }  // namespace wive

@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "build/builder.h"
-#include "build/far_away.h"
 #include "build/write_node.h"
 #include "core/parallel.h"
 

@@ -1,8 +1,5 @@
 #include "kernels/closest_kernels.h"
 
-#include <algorithm>
-
-#include "core/parallel.h"
 #include "kernels/share_runs.h"
 
 namespace wive {
@@ -29,9 +26,7 @@ template const ClosestKernels<double>* find_closest_kernels(IsaName);
 template <class Real>
 void find_closest_points(FindClosest<Real> kernel, const BvhView& bvh, const PointBatch<Real>& points,
                          const ClosestBatch<Real>& out, std::size_t count, unsigned threads) {
-    const std::size_t runs = (count + points_per_run - 1) / points_per_run;
-    const unsigned workers = runs <= 1 ? 1 : static_cast<unsigned>(std::min<std::size_t>(runs, thread_count(threads)));
-    share_runs(count, points_per_run, workers,
+    share_runs(count, points_per_run, worker_count(count, points_per_run, threads),
                [&](std::size_t, const RaySource& source) { kernel(bvh, points, out, source); });
 }
 

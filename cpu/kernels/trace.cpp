@@ -3,7 +3,6 @@
 #include <algorithm>
 
 #include "core/large_array.h"
-#include "core/parallel.h"
 #include "kernels/share_runs.h"
 #include "traverse/hit_list.h"
 
@@ -19,10 +18,7 @@ constexpr std::size_t fewest_in_flight = 16;
 
 }  // namespace
 
-unsigned worker_count(std::size_t count, unsigned threads) {
-    const std::size_t runs = (count + rays_per_run - 1) / rays_per_run;
-    return runs <= 1 ? 1 : static_cast<unsigned>(std::min<std::size_t>(runs, thread_count(threads)));
-}
+unsigned worker_count(std::size_t count, unsigned threads) { return worker_count(count, rays_per_run, threads); }
 
 template <class Real>
 void trace(const KernelTable<Real>& table, TraceBatch<Real> kernel, const BvhView& bvh, const RayBatch<Real>& rays,

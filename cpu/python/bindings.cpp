@@ -266,7 +266,7 @@ PYBIND11_MODULE(_cpu, m, pybind11::mod_gil_not_used()) {
         .def_property_readonly("far_distance",
                                [](const PyBvh& self) {
                                    const DefaultFloats floats;
-                                   return self.unverified().far_distance();
+                                   return self.unverified().distant().far;
                                })
         .def_property_readonly("accuracy",
                                [](const PyBvh& self) { return accuracy_name(self.unverified().accuracy()); })

@@ -213,13 +213,23 @@ private:
 // What queries take: a handle that has looked its kernels up, or a name, which is looked up at each call.
 using KernelArg = std::variant<const PyKernels*, std::string>;
 
+// The handle; null if a name is given.
+inline const PyKernels* handle_of(const KernelArg& kernel) {
+    const auto* handle = std::get_if<const PyKernels*>(&kernel);
+    if (!handle) return nullptr;
+    expect(*handle != nullptr, "kernel: expected Kernels or a name, got None");
+    return *handle;
+}
+
+inline const std::string& name_of(const KernelArg& kernel) {
+    const PyKernels* handle = handle_of(kernel);
+    return handle ? handle->name() : std::get<std::string>(kernel);
+}
+
 template <class Real>
 const KernelTable<Real>& table_of(const KernelArg& kernel) {
-    if (const auto* handle = std::get_if<const PyKernels*>(&kernel)) {
-        expect(*handle != nullptr, "kernel: expected Kernels or a name, got None");
-        return (*handle)->table<Real>();
-    }
-    return find_kernels<Real>(std::get<std::string>(kernel));
+    const PyKernels* handle = handle_of(kernel);
+    return handle ? handle->table<Real>() : find_kernels<Real>(std::get<std::string>(kernel));
 }
 
 // Calls define(float{}), then define(double{}). Python picks the overload by dtype and tries float32 first.

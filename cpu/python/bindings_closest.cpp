@@ -16,14 +16,6 @@ namespace {
 #include "core/triangle_distance.inc"
 // clang-format on
 
-IsaName isa_of(const KernelArg& kernel) {
-    if (const auto* handle = std::get_if<const PyKernels*>(&kernel)) {
-        expect(*handle != nullptr, "kernel: expected Kernels or a name, got None");
-        return find_isa((*handle)->name());
-    }
-    return find_isa(std::get<std::string>(kernel));
-}
-
 template <class Real>
 py::tuple closest(const PyBvh& self, const KernelArg& kernel, const Array<Real>& points,
                   const Array<Real>& max_distance, unsigned threads) {
@@ -33,7 +25,8 @@ py::tuple closest(const PyBvh& self, const KernelArg& kernel, const Array<Real>&
     expect(max_distance.size() == 1 || max_distance.size() == count,
            "max_distance: expected one value or one per point");
     const Bvh& bvh = self.bvh();
-    const FindClosest<Real> find = find_closest_kernels<Real>(isa_of(kernel))->find(bvh.accuracy(), bvh.node_form());
+    const FindClosest<Real> find =
+        find_closest_kernels<Real>(find_isa(name_of(kernel)))->find(bvh.accuracy(), bvh.node_form());
     const auto size = static_cast<std::size_t>(count);
     expect_memory(size * (3 * sizeof(Real) + sizeof(std::int32_t)));
     auto distance = new_array<Real>({count}), uv = new_array<Real>({count, 2});

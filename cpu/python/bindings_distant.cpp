@@ -3,6 +3,7 @@
 #include <cmath>
 #include <limits>
 
+#include "build/far_away.h"
 #include "core/interval.h"
 #include "python/bindings.h"
 #include "python/each_hit.h"
@@ -67,6 +68,12 @@ struct GivenRays {
         return same;
     }
 };
+
+template <class Real>
+bool may_have_far(const Array<Real>& origins, const std::array<double, 3>& center, double far) {
+    expect_shape(origins, 3, "origins: expected shape (n, 3)");
+    return Distant{center, far}.may_hold(origins.data(), static_cast<std::size_t>(origins.shape(0)));
+}
 
 // The rays as a float32 scene traces them: origins (n,3), tmin, tmax and how far each was moved (n,); None if none was.
 // `kept`: rays that float holds stay.
@@ -134,6 +141,9 @@ Array<double> nearest_ahead(const Array<double>& origins, const Array<double>& d
 }  // namespace
 
 void bind_distant(py::module_& m) {
+    for_each_precision([&]<class Real>(Real) {
+        m.def("may_have_far", &may_have_far<Real>, array_arg("origins"), py::arg("center"), py::arg("far"));
+    });
     m.def("bring_near", &bring_near, array_arg("origins"), array_arg("directions"), array_arg("rounded_origins"),
           array_arg("rounded_directions"), array_arg("tmin"), array_arg("tmax"), py::arg("center"), py::arg("far"),
           py::arg("most"), py::arg("kept"), py::arg("threads") = 0);

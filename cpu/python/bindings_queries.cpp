@@ -184,7 +184,8 @@ py::object query_ready(const PyBvh& self, const PyKernels& kernels, py::handle o
     const Real* along = ready_rows<Real>(directions, others);
     if (!from || !along || count != others || !set_limit(tmin, low) || !set_limit(tmax, high)) return py::none();
     if constexpr (std::is_same_v<Real, float>)
-        if (self.bvh().accuracy() != Accuracy::exact && self.bvh().may_have_far(from, static_cast<std::size_t>(count)))
+        if (self.bvh().accuracy() != Accuracy::exact &&
+            self.bvh().distant().may_hold(from, static_cast<std::size_t>(count)))
             return py::none();
     return query({self, kernels.table<Real>(), {from, along, &low, &high, 0, 0}, count, 0, 0, false});
 }

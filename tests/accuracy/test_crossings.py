@@ -249,8 +249,7 @@ def as_traced(
     ball = Ball.around(scene.bounds, scene._bvh.far_distance)
     given = origins.astype(np.float64), directions.astype(np.float64)
     limits = np.float32([-np.inf]), np.float32([np.inf])
-    where = ball.center.tolist(), ball.far, MOST_COORDINATE
-    brought = _cpu.bring_near(*given, origins, directions, *limits, *where, kept=False)
+    brought = _cpu.bring_near(*given, origins, directions, *limits, *ball, MOST_COORDINATE, kept=False)
     return (origins if brought is None else brought[0]), directions
 
 

@@ -9,7 +9,7 @@ from wive.warp_kernels.lanes.precision import PRECISIONS
 from wive.warp_kernels.launching.kernels import MODULE_OPTIONS, value_of
 from wive.warp_kernels.launching.launch import default_block_dim
 from wive.warp_kernels.traversal.closest_point import Located, make_closest_point
-from wive.warp_kernels.tree.handle import HANDLES
+from wive.warp_kernels.tree.handle import CORRUPTION, HANDLES
 from wive.warp_kernels.tree.quiet import launch
 from wive.warp_kernels.tree.tree import Tree
 
@@ -36,7 +36,7 @@ def make_closest_kernel(accuracy: str, stack_size: int, nodes: str, precision: s
         found.u = wp.float64(wp.nan)
         found.v = wp.float64(wp.nan)
         found.prim = -1
-        if tree.error[0] == 0:
+        if tree.error[CORRUPTION] == 0:
             found = search(tree, points[i], value_of(max_distance, i))
         distance[i] = real(found.distance)
         prim[i] = found.prim

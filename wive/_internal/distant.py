@@ -19,8 +19,6 @@ from wive._internal.rays import Rays
 
 # From this many radii away, rounding moves a ray by less than 1e-4 radii. Nearer ones are left as they are.
 FAR = 256.0
-# NumPy's reductions take longer than Python's of so few rays, and most of the time of a one-ray query.
-FEW = 16
 # The largest coordinate of an origin that does not miss, docs/accuracy.md.
 MOST_COORDINATE = 1e18
 
@@ -29,34 +27,24 @@ Traced = tuple[Floats, Floats, Floats, Floats]
 
 
 class Ball(NamedTuple):
-    """A ball that contains all triangles, and the coordinates between which no origin is far from it."""
+    """A ball that contains all triangles."""
 
-    center: Float64
+    center: list[float]
     far: float  # from its center, at least two radii
-    lowest: float
-    highest: float
 
     @classmethod
     def around(cls, bounds: Floats, far: float | None = None) -> Ball:
         """The ball around a box (2,3); if that is empty or infinite, no origin is far."""
         if not np.isfinite(bounds).all():
-            return cls(np.zeros(3), np.inf, -np.inf, np.inf)
+            return cls([0.0] * 3, np.inf)
         low, high = bounds.astype(np.float64)
-        center = low + (high - low) / 2
         if far is None:
             far = FAR * math.hypot(*(high - low)) / 2
-        return cls(center, far, float(center.max()) - far, float(center.min()) + far)
+        return cls((low + (high - low) / 2).tolist(), far)
 
     def may_have_far(self, origins: Floats) -> bool:
-        """Whether some origin (n,3) may be far; two reductions show that none is in most batches."""
-        if len(origins) == 0:
-            return False
-        if len(origins) < FEW:
-            numbers = origins.reshape(-1).tolist()
-            lowest, highest = min(numbers), max(numbers)
-        else:
-            lowest, highest = origins.min(), origins.max()
-        return not (self.lowest <= lowest and highest <= self.highest)
+        """Whether some origin (n,3) may be far; cheap, and False of most batches."""
+        return _cpu.may_have_far(origins, self.center, self.far)
 
     def just_before(self, origins: Float64, directions: Float64) -> Float64:
         """(n,3) where rays that start far away are two radii before they come nearest to the center.
@@ -64,7 +52,7 @@ class Ball(NamedTuple):
         The origin of a ray that starts near, or that has the center behind.
         """
         most, before = float(np.finfo(np.float64).max), 2 * self.far / FAR
-        return _cpu.nearest_ahead(origins, directions, self.center.tolist(), self.far, most, before)
+        return _cpu.nearest_ahead(origins, directions, self.center, self.far, most, before)
 
 
 class Moved(NamedTuple):
@@ -96,9 +84,9 @@ def moved(rays: Rays, arrays: Traced, real: Real, ball: Ball, threads: int = 0) 
     if real is EXACT and rays.are(np.dtype(np.float32)):
         return None
     origins, directions, *_ = rays.numpy(FLOAT64)
-    center, exact = ball.center.tolist(), real is EXACT
+    exact = real is EXACT
     brought = _cpu.bring_near(
-        origins, directions, *arrays, center, ball.far, MOST_COORDINATE, kept=exact, threads=threads
+        origins, directions, *arrays, *ball, MOST_COORDINATE, kept=exact, threads=threads
     )
     if brought is None:
         return None

@@ -8,6 +8,7 @@ from contextlib import AbstractContextManager
 from typing import Any, NamedTuple
 
 from wive._internal.arrays import Library
+from wive._internal.known_meshes import mesh_attributes
 
 
 class Wrapping(NamedTuple):
@@ -25,6 +26,17 @@ class Wrapping(NamedTuple):
     def on_stream(self) -> AbstractContextManager[Any]:
         """A block whose Warp launches and allocations go to the library's current stream."""
         return self.library.on_stream(self.device)
+
+
+def keep_wrapped(results: Any, home: Any, wrapping: Wrapping, *names: str) -> None:
+    """Give `results` the arrays of `home` of these names, wrapped, and the mesh of `home`."""
+    arrays = {name: wrapping.wrap(getattr(home, name)) for name in names}
+    vars(results).update(arrays, **mesh_attributes(home), _home=home, _wrapping=wrapping)
+
+
+def library_name(array: Any) -> str:
+    """The package that an array's type comes from."""
+    return type(array).__module__.partition(".")[0]
 
 
 def from_home(member: Any) -> Any:

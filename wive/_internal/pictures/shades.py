@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wive._internal.picture import Image
+from wive._internal.picture_rays import pixel_centres
 from wive._internal.pictures.albedo import Albedo
 from wive._internal.pictures.sampling import cosine_directions, pcg4d, to_unit
 from wive._internal.precision import Floats
@@ -177,8 +178,7 @@ def render_depth(image: Image, frame: Float64, scene: Scene, threads: int | None
     height, width = map(int, image.shape)
     for begin, end in bands(height, width):
         eye, centre, right, top = frame
-        x = (2 * np.arange(width) + 1) / width - 1
-        y = 1 - (2 * np.arange(begin, end) + 1) / height
+        x, y = pixel_centres(width), -pixel_centres(height)[begin:end]
         directions = (centre + y[:, None, None] * top) + x[:, None] * right
         rays = np.ascontiguousarray(directions.reshape(-1, 3), np.dtype(scene.precision))
         image[begin:end] = scene.intersect(eye, rays, threads=threads).t.reshape(end - begin, width)

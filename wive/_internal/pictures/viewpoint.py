@@ -70,9 +70,8 @@ def _outline(scene: Scene, places: Places) -> Float64:
     """
     low, high = scene.bounds.astype(np.float64)
     corners = scene.vertices[scene.faces[:: len(scene) // MOST_OUTLINE + 1]].reshape(-1, 3)
-    corners = corners[
-        ((corners >= low) & (corners <= high)).all(axis=1)
-    ]  # others belong to no triangle with area
+    within = ((corners >= low) & (corners <= high)).all(axis=1)  # others belong to no triangle with area
+    corners = corners[within]
     triangles = places.points[1::2]
     middle = np.quantile(triangles, (FRINGE, 1 - FRINGE), axis=0)
     extent = middle[1] - middle[0]
