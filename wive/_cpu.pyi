@@ -377,9 +377,9 @@ def nearest_ahead(
     before: float,
     threads: int = 0,
 ) -> NDArray[np.float64]:
-    """(n,3) where rays farther than far from center are, the length `before` they come nearest to it.
+    """(n,3) points on rays, the length `before` in front of their points nearest to center.
 
-    The origins of other rays, and of those that have the center behind.
+    For rays whose origin is farther than far from center and that have it ahead; the origins of others.
     """
 
 def between(

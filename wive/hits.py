@@ -64,7 +64,7 @@ def geoms_of(hits: InMeshes) -> Geoms:
 
 
 class OnTriangles:
-    """Places on triangles of a mesh: `prim` (n,), -1 for none, and `uv` (n,2)."""
+    """Places on triangles of a mesh: `prim` (n,) and `uv` (n,2)."""
 
     prim: NDArray[np.int32]
     uv: Floats
@@ -105,7 +105,7 @@ class OnTriangles:
 
 
 class OnSurface(OnTriangles):
-    """Places of which some are on no triangle."""
+    """Places on triangles, or on none: `prim` is -1 there."""
 
     @property
     def mask(self) -> NDArray[np.bool_]:

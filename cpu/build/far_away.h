@@ -1,4 +1,4 @@
-// From where a tree is seen from far away.
+// Which distances from a tree are large.
 #pragma once
 
 #include <array>
@@ -19,8 +19,8 @@ struct Distant {
     std::array<double, 3> center;
     double far;
 
-    // Whether some origin (n, 3) may be far: all of those that are, and of the others those that are farther than `far`
-    // from another coordinate of the middle.
+    // Whether some origin (n, 3) may be far. True if one is; it may also be true if none is, because all axes are
+    // compared with one range.
     template <class Real>
     bool may_hold(const Real* origins, std::size_t count) const;
 };

@@ -117,8 +117,8 @@ py::object bring_near(const Array<double>& origins, const Array<double>& directi
     return py::make_tuple(std::move(near), std::move(low), std::move(high), std::move(steps));
 }
 
-// Where rays are that start far away `before` they come nearest to the centre, a length, if that lies ahead; the
-// others' origins.
+// For each ray that starts far away and has the centre ahead: the point on it that lies the length `before` in front of
+// its point nearest to the centre. For other rays: their origins.
 Array<double> nearest_ahead(const Array<double>& origins, const Array<double>& directions,
                             const std::array<double, 3>& center, double far, double most, double before,
                             unsigned threads) {
