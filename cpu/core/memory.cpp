@@ -10,6 +10,7 @@
 #include <string_view>
 
 #include "core/control_groups.h"
+#include "core/poll.h"
 
 #if defined(__linux__)
 #include <sys/resource.h>
@@ -110,6 +111,7 @@ bool can_throw() {
 void prepare_to_throw() {
     // volatile: compilers leave out a call whose result is not used. It allocates the thread's record of exceptions.
     [[maybe_unused]] const volatile int exceptions = std::uncaught_exceptions();
+    poll_caller();  // likewise the thread's variables of this library
 }
 
 std::string bytes_text(std::size_t bytes) {

@@ -31,8 +31,8 @@ void expect_memory(std::size_t bytes);
 // limited, or the system grants no more than it has.
 bool requests_can_fail();
 
-// A thread that throws for the first time needs some memory for that, and the C library ends the process if there is
-// none. This takes it while there is.
+// A thread that throws or polls (poll.h) for the first time needs some memory for that, and the C library ends the
+// process if there is none. This takes it while there is.
 void prepare_to_throw();
 // prepare_to_throw() if there is memory for it; false if there is none.
 bool can_throw();
