@@ -70,6 +70,22 @@ class Kernels:
     @property
     def name(self) -> str: ...
 
+def move_part(
+    holders: tuple[object, Bvh, NDArray[Real]],
+    alike: tuple[object, Bvh, NDArray[Real]],
+    rows: NDArray[Real],
+    starts: NDArray[np.int32],
+    i: int,
+    forget: tuple[str, ...],
+) -> bool:
+    """Move mesh i, whose vertices are rows starts[i] to starts[i+1], in place: its vertices are `rows` then.
+
+    holders: what traces, its tree and the vertices. The tree stays, and False is returned, unless the first
+        two have as few references as those in `alike`; and if `prepare_part` was not called, or only a new
+        tree will do. If the vertices have more references, or their memory is others', they are copied.
+    forget: attributes of what traces, which are deleted, as they followed from the old positions.
+    """
+
 class Bvh:
     """The 8-wide tree over one mesh: never changed, shared by every backend."""
 
@@ -93,6 +109,8 @@ class Bvh:
 
         Of another shape if a triangle without an area gains some. Raises ValueError as construction does.
         """
+    def prepare_part(self, first_faces: NDArray[np.int32], i: int) -> None:
+        """Find the leaves of mesh i for `move_part`; the faces of mesh k begin at row first_faces[k]."""
     @property
     def vertices(self) -> NDArray[Any]:
         """(v,3) the array it was built from."""

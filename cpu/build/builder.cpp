@@ -30,8 +30,15 @@ constexpr std::size_t fewest_block_units(Precision precision, NodeForm form) {
                                         : TriangleBlock::units();
 }
 
-// On an axis, the centre leaves zero only if the mesh's middle is more than this many half extents away from it.
-constexpr double far_from_origin = 4;
+// On each axis, a mesh's middle is at most this many half extents away from its tree's centre.
+constexpr double far_from_center = 4;
+
+double half_size_of(const Bounds& bounds) {
+    const auto& [low, high] = bounds;
+    return 0.5 * std::max({high[0] - low[0], high[1] - low[1], high[2] - low[2]});
+}
+
+double middle_of(const Bounds& bounds, std::size_t axis) { return 0.5 * bounds[0][axis] + 0.5 * bounds[1][axis]; }
 
 }  // namespace
 
@@ -92,12 +99,11 @@ template Bvh::Bvh(const Mesh<double>&, const BuildOptions&);
 // is zero, and planes stay exact.
 void Bvh::set_bounds(const Bounds& bounds) {
     facts_.bounds = bounds;
-    const auto& [low, high] = facts_.bounds;
-    if (!(low[0] <= high[0])) return;
-    const double half_size = 0.5 * std::max({high[0] - low[0], high[1] - low[1], high[2] - low[2]});
+    if (!(bounds[0][0] <= bounds[1][0])) return;
     for (std::size_t axis = 0; axis < 3; ++axis) {
-        const double middle = 0.5 * low[axis] + 0.5 * high[axis];
-        facts_.center[axis] = std::abs(middle) > far_from_origin * half_size ? static_cast<float>(middle) : 0.0f;
+        const double middle = middle_of(bounds, axis);
+        const bool is_near_zero = std::abs(middle) <= far_from_center * half_size_of(bounds);
+        facts_.center[axis] = is_near_zero ? 0.0f : static_cast<float>(middle);
     }
 }
 
@@ -114,6 +120,24 @@ Point Bvh::finish_bounds(const Box& all) {
         }
     return remaining_center;
 }
+
+template <class Real>
+bool Bvh::move_bounds(const Bounds& bounds) {
+    if (!(bounds[0][0] <= bounds[1][0])) return false;
+    for (std::size_t axis = 0; axis < 3; ++axis)
+        if (!(std::abs(middle_of(bounds, axis) - facts_.center[axis]) <= far_from_center * half_size_of(bounds)))
+            return false;
+    facts_.bounds = bounds;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+        const float center = facts_.center[axis];
+        facts_.extent[axis] = std::max(plane_above(static_cast<Real>(bounds[1][axis]), center),
+                                       -plane_below(static_cast<Real>(bounds[0][axis]), center));
+    }
+    return true;
+}
+
+template bool Bvh::move_bounds<float>(const Bounds&);
+template bool Bvh::move_bounds<double>(const Bounds&);
 
 BvhView Bvh::view() const {
     return {units_.data(),

@@ -51,6 +51,9 @@ public:
     // see verify.h.
     Bvh(const TreeFacts& facts, std::span<const std::byte> units) : facts_(facts), units_(units) {}
 
+    // Whether its nodes and blocks can be changed in place: they are not compressed, nor others'.
+    bool can_change() const { return facts_.form == NodeForm::float32 && memory_.size() > 0; }
+
     // Refits to moved vertices: new boxes and triangles, the same children and orders. Returns null if refitting is
     // impossible: a formerly degenerate triangle (in no leaf) gained area, or the tree is compressed (leaf sizes depend
     // on vertices). Throws as the constructor does. Real must be that of the mesh the tree was built from.
@@ -79,6 +82,9 @@ public:
     Sah sah() const;
 
 private:
+    template <class Real>
+    friend class PartMover;
+
     Bvh() = default;
     template <class Real>
     void build(const Mesh<Real>& mesh, const BuildOptions& options, Threads& threads);
@@ -87,6 +93,10 @@ private:
     // Sets bounds (float32) and extent from the box of all triangles. Returns the point to subtract from
     // planes: the centre, or zero for float64, whose boxes are relative to the centre from box_triangle on.
     Point finish_bounds(const Box& all);
+    // Sets bounds and extent of a tree whose centre stays. False, and nothing is set, if the centre is too far from
+    // them, or if there are none.
+    template <class Real>
+    bool move_bounds(const Bounds& bounds);
     template <class StoredNode>
     Sah sah_of(double root) const;
     // Takes the memory of nodes and blocks.

@@ -73,10 +73,16 @@ bool surely_has_area(Float4v a, Float4v b, Float4v c) {
     return (sure[0] | sure[1] | sure[2]) != 0;
 }
 
-bool surely_has_area(const double* a, const double* b, const double* c) {
+template <class Real>
+bool surely_has_area(const Real* a, const Real* b, const Real* c) {
     constexpr double error = 4 * std::numeric_limits<double>::epsilon(),
                      underflow = 4 * std::numeric_limits<double>::min();
-    const double u[3] = {b[0] - a[0], b[1] - a[1], b[2] - a[2]}, v[3] = {c[0] - a[0], c[1] - a[1], c[2] - a[2]};
+    double u[3], v[3];
+    for (int k = 0; k < 3; ++k) {
+        const double origin = a[k];
+        u[k] = b[k] - origin;
+        v[k] = c[k] - origin;
+    }
     bool sure = false;
     for (int k = 0; k < 3; ++k) {
         const int i = (k + 1) % 3, j = (k + 2) % 3;
@@ -218,20 +224,21 @@ bool box_triangle(const Mesh<double>& mesh, const Point& center, std::size_t fac
     return surely_has_area(a, b, c) || has_area(a, b, c);
 }
 
-Bounds find_bounds(const Mesh<double>& mesh, Threads& threads) {
+template <class Real>
+Bounds find_bounds(const Mesh<Real>& mesh, Threads& threads) {
     constexpr double infinity = std::numeric_limits<double>::infinity();
     constexpr Bounds none = {{{infinity, infinity, infinity}, {-infinity, -infinity, -infinity}}};
-    const auto grow = [](Bounds& bounds, const double* low, const double* high) {
+    const auto grow = [](Bounds& bounds, const auto* low, const auto* high) {
         for (std::size_t axis = 0; axis < 3; ++axis) {
-            bounds[0][axis] = std::min(bounds[0][axis], low[axis]);
-            bounds[1][axis] = std::max(bounds[1][axis], high[axis]);
+            bounds[0][axis] = std::min<double>(bounds[0][axis], low[axis]);
+            bounds[1][axis] = std::max<double>(bounds[1][axis], high[axis]);
         }
     };
     std::vector<Bounds> parts((mesh.face_count + chunk_size - 1) / chunk_size, none);
     parallel_chunks(mesh.face_count, chunk_size, threads, [&](std::size_t begin, std::size_t end) {
         Bounds part = none;
         for (std::size_t face = begin; face < end; ++face) {
-            double corners[3][3];
+            Real corners[3][3];
             if (!mesh.load_corners(face, corners)) continue;
             const auto& [a, b, c] = corners;
             if (!surely_has_area(a, b, c) && !has_area(a, b, c)) continue;
@@ -243,6 +250,9 @@ Bounds find_bounds(const Mesh<double>& mesh, Threads& threads) {
     for (const Bounds& part : parts) grow(all, part[0].data(), part[1].data());
     return all;
 }
+
+template Bounds find_bounds(const Mesh<float>&, Threads&);
+template Bounds find_bounds(const Mesh<double>&, Threads&);
 
 template <class Real>
 PrimRefs make_prim_refs(const Mesh<Real>& mesh, const Point& center, Threads& threads) {

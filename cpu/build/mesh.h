@@ -103,7 +103,8 @@ bool box_triangle(const Mesh<double>& mesh, const Point& center, std::size_t fac
 using Bounds = std::array<std::array<double, 3>, 2>;
 
 // The bounds of the triangles with an area.
-Bounds find_bounds(const Mesh<double>& mesh, Threads& threads);
+template <class Real>
+Bounds find_bounds(const Mesh<Real>& mesh, Threads& threads);
 
 struct PrimRefs {
     LargeArray<PrimRef> refs;

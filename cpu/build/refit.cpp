@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "build/builder.h"
+#include "build/refit_leaf.h"
 #include "build/write_node.h"
 #include "core/parallel.h"
 
@@ -38,16 +39,17 @@ public:
         for (; top < nodes.size() && nodes.size() - top < task_count; ++top)
             for (const std::uint32_t child : from_.template node<Form>(nodes[top]).child)
                 if (is_inner(child)) nodes.push_back(child);
-        std::vector<std::size_t> counts(nodes.size());
-        parallel_for(nodes.size() - top, threads, [&](std::size_t i) { fit_subtree(nodes[top + i], counts[top + i]); });
+        std::vector<std::size_t> lost(nodes.size());
+        parallel_for(nodes.size() - top, threads, [&](std::size_t i) { fit_subtree(nodes[top + i], lost[top + i]); });
         for (std::size_t i = top; i-- > 0;)
-            fit_node(nodes[i], counts[i], [&](std::uint32_t child) { return box_of(child); });
-        for (const std::size_t count : counts) triangle_count_ += count;
+            fit_node(nodes[i], lost[i], [&](std::uint32_t child) { return box_of(child); });
+        for (const std::size_t count : lost) lost_count_ += count;
     }
 
     const Box* boxes(std::size_t node) const { return boxes_.data() + node_width * node; }
     Box all() const { return box_of(inner_child(0)); }
-    std::size_t triangle_count() const { return triangle_count_; }
+    // The triangles that no longer have an area.
+    std::size_t lost_count() const { return lost_count_; }
 
 private:
     static std::size_t index_of(std::uint32_t child) { return child_offset(child) / sizeof(Node); }
@@ -59,7 +61,7 @@ private:
     }
 
     template <class BoxOfInner>
-    void fit_node(std::uint32_t node, std::size_t& count, const BoxOfInner& box_of_inner) {
+    void fit_node(std::uint32_t node, std::size_t& lost, const BoxOfInner& box_of_inner) {
         const Node& old = from_.template node<Form>(node);
         Box* boxes = boxes_.data() + node_width * index_of(node);
         for (int lane = 0; lane < node_width; ++lane) {
@@ -67,33 +69,20 @@ private:
             if (child == end_of_stack)
                 boxes[lane] = Box{};
             else
-                boxes[lane] = is_inner(child) ? box_of_inner(child) : fit_leaf(child, count);
+                boxes[lane] = is_inner(child) ? box_of_inner(child) : fit_leaf(child, lost);
         }
     }
 
-    Box fit_subtree(std::uint32_t node, std::size_t& count) {
-        fit_node(node, count, [&](std::uint32_t child) { return fit_subtree(child, count); });
+    Box fit_subtree(std::uint32_t node, std::size_t& lost) {
+        fit_node(node, lost, [&](std::uint32_t child) { return fit_subtree(child, lost); });
         return box_of(node);
     }
 
-    // Writes a leaf without the triangles that lost their area. Returns its box.
-    Box fit_leaf(std::uint32_t leaf, std::size_t& count) {
+    Box fit_leaf(std::uint32_t leaf, std::size_t& lost) {
         const Block* old = from_.template leaf<Form>(leaf);
         Block* block = reinterpret_cast<Block*>(to_ + child_offset(leaf));
-        Box all;
-        for (std::uint32_t i = 0; i < leaf_block_count(leaf); ++i) {
-            clear_block(block[i]);
-            for (std::uint32_t lane = 0; lane < block_width; ++lane) {
-                Box box;
-                if (old[i].prim[lane] < 0) continue;
-                const std::uint32_t prim = static_cast<std::uint32_t>(old[i].prim[lane]);
-                if (!box_triangle(mesh_, center_, prim, box)) continue;
-                write_triangle(block[i], lane, mesh_, prim, accuracy_);
-                all.grow(box);
-                ++count;
-            }
-        }
-        return all;
+        return refit_leaf(old, block, leaf_block_count(leaf), mesh_, center_, accuracy_,
+                          [&lost](std::uint32_t) { ++lost; });
     }
 
     const BvhView& from_;
@@ -102,7 +91,7 @@ private:
     const Point& center_;
     Accuracy accuracy_;
     LargeArray<Box> boxes_;
-    std::size_t triangle_count_ = 0;
+    std::size_t lost_count_ = 0;
 };
 
 template <class Real>
@@ -149,7 +138,7 @@ std::unique_ptr<Bvh> Bvh::refitted(const Mesh<Real>& mesh, unsigned requested_th
     if constexpr (precision_of<Real> == Precision::float64) bvh->set_bounds(find_bounds(mesh, threads));
     BoxFitter<Real> fitter(from, facts_.node_count, units, mesh, bvh->facts_.center, facts_.accuracy);
     fitter.fit(threads);
-    bvh->facts_.triangle_count = fitter.triangle_count();
+    bvh->facts_.triangle_count = facts_.triangle_count - fitter.lost_count();
     const Point remaining_center = bvh->finish_bounds(fitter.all());
     const Node* old_nodes = reinterpret_cast<const Node*>(units_.data());
     Node* to = reinterpret_cast<Node*>(units);

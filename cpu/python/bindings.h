@@ -20,6 +20,7 @@
 #include <variant>
 
 #include "build/builder.h"
+#include "build/part_mover.h"
 #include "build/winding.h"
 #include "core/default_floats.h"
 #include "core/poll.h"
@@ -166,16 +167,35 @@ public:
     // Made by the first call, for scenes that are asked for winding numbers.
     template <class Real>
     const WindingTable<Real>& winding() const {
-        std::call_once(winding_made_,
-                       [this] { winding_.emplace<Winding<Real>>(new WindingTable(bvh(), mesh<Real>())); });
-        return *std::get<Winding<Real>>(winding_);
+        WindingCache& cache = *winding_;
+        std::call_once(cache.made, [&] { cache.table.emplace<Winding<Real>>(new WindingTable(bvh(), mesh<Real>())); });
+        return *std::get<Winding<Real>>(cache.table);
     }
+
+    // What moves single meshes of the tree, ready for mesh i; null before prepare_part.
+    template <class Real>
+    PartMover<Real>* part_mover() {
+        auto* mover = std::get_if<Mover<Real>>(&mover_);
+        return mover ? mover->get() : nullptr;
+    }
+    // first_faces: where the faces of each mesh begin, and how many there are.
+    template <class Real>
+    void prepare_part(const Array<std::int32_t>& first_faces, std::size_t i);
+    // PartMover::move for these vertices, which take the place of the tree's own if it returns true.
+    template <class Real>
+    bool move_part(Array<Real> vertices, PartMover<Real>& mover, std::size_t i, Threads& threads);
 
 private:
     void verify() const;
 
     template <class Real>
     using Winding = std::unique_ptr<const WindingTable<Real>>;
+    struct WindingCache {
+        std::once_flag made;
+        std::variant<Winding<float>, Winding<double>> table;
+    };
+    template <class Real>
+    using Mover = std::unique_ptr<PartMover<Real>>;
 
     std::variant<Array<float>, Array<double>> vertices_;
     Array<std::int32_t> faces_;
@@ -183,8 +203,9 @@ private:
     std::optional<Stored> stored_;
     std::unique_ptr<Bvh> bvh_;
     mutable std::atomic<bool> is_verified_ = true;
-    mutable std::once_flag winding_made_;
-    mutable std::variant<Winding<float>, Winding<double>> winding_;
+    mutable std::unique_ptr<WindingCache> winding_ = std::make_unique<WindingCache>();
+    std::variant<Mover<float>, Mover<double>> mover_;
+    std::mutex preparing_;
 };
 
 // The kernels of one name, looked up by the first query of each precision and then kept. Not earlier: to look up
@@ -243,7 +264,8 @@ using PyBvhClass = py::class_<PyBvh>;
 
 // Defined in bindings_queries.cpp: ray queries. In bindings_surface.cpp: points and normals of hits. In
 // bindings_closest.cpp: closest points. In bindings_spawn.cpp: spawned rays. In bindings_segments.cpp: line of sight.
-// In bindings_distant.cpp: rays from far away. In bindings_stored.cpp: stored trees.
+// In bindings_distant.cpp: rays from far away. In bindings_stored.cpp: stored trees. In bindings_parts.cpp: single
+// meshes that move.
 void bind_queries(PyBvhClass& bvh);
 void bind_closest(py::module_& m, PyBvhClass& bvh);
 void bind_surface(py::module_& m);
@@ -251,6 +273,7 @@ void bind_spawn(py::module_& m);
 void bind_segments(py::module_& m);
 void bind_distant(py::module_& m);
 void bind_stored(py::module_& m, PyBvhClass& bvh);
+void bind_parts(py::module_& m, PyBvhClass& bvh);
 
 // The options of a tree by their names; std::invalid_argument for others. In bindings.cpp.
 Accuracy parse_accuracy(const std::string& name);

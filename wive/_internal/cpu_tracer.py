@@ -30,6 +30,7 @@ class CpuTracer:
 
     device = None
     lacks = ("lanes",)
+    COMPUTED = ("vertices", "closed", "_ball")  # kept when read; they follow from the vertices
 
     def __init__(
         self, bvh: _cpu.Bvh, faces: NDArray[np.int32], backend: str, geoms: Geoms | None = None
@@ -42,7 +43,6 @@ class CpuTracer:
             real_of(bvh.vertices.dtype, bvh.accuracy),
         )
         self._kernels = _cpu.Kernels(backend)
-        self._vertices = bvh.vertices
         self._ready: dict[str, Callable[..., Any]] = {
             "intersect": bvh.intersect_ready,
             "occluded": bvh.occluded_ready,
@@ -66,7 +66,7 @@ class CpuTracer:
         if query == "intersect":
             t, prim, uv, _ = found
             rays = rays_of_numpy(origins, directions, tmin, tmax)
-            mesh = self._vertices, self._faces
+            mesh = self.vertices, self._faces
             return Hits(t, prim, uv, *mesh, rays, self._accuracy, None, self.geoms)
         return found[0]
 
@@ -78,7 +78,7 @@ class CpuTracer:
         )
         if near is not None:
             t = near.t(t)
-        hits = Hits(t, prim, uv, self.bvh.vertices, self._faces, rays, self._accuracy, near, self.geoms)
+        hits = Hits(t, prim, uv, self.vertices, self._faces, rays, self._accuracy, near, self.geoms)
         if rays.library is not NUMPY:
             hits = WrappedHits(hits, _wrapping(rays))
         return hits, None if steps is None else stats_of(steps, rays.library)
@@ -105,7 +105,7 @@ class CpuTracer:
         options = work.threads, work.in_flight, work.stats, work.touching
         found = self.bvh.intersect_all(self._kernels, *arrays, *options, max_bytes=work.max_bytes)
         offsets, t, prim, uv, steps = found
-        mesh = self.bvh.vertices, self._faces, self.geoms
+        mesh = self.vertices, self._faces, self.geoms
         hits = AllHits(offsets, t, prim, uv, *mesh)
         if near is not None:
             hits = AllHits(offsets, near.t(t, hits.ray), prim, uv, *mesh)
@@ -117,7 +117,7 @@ class CpuTracer:
         """The surface's closest points."""
         arrays = points.numpy(self._real)
         found = self.bvh.closest(self._kernels, *arrays, work.threads)
-        closest = Closest(*found, self._vertices, self._faces, self.geoms)
+        closest = Closest(*found, self.vertices, self._faces, self.geoms)
         if points.library is NUMPY and points.leading is None:
             return closest
         return WrappedClosest(closest, Wrapping(points.library, "cpu", points.answer))
@@ -129,6 +129,11 @@ class CpuTracer:
     def signed_distance(self, points: Points, sign: SignOption, work: Work) -> Any:
         """(n,) distances, negative inside."""
         return points.answer(signed_distances(self, self._faces, points, sign, work))
+
+    @functools.cached_property
+    def vertices(self) -> Floats:
+        """The tree's vertices."""
+        return self.bvh.vertices
 
     @functools.cached_property
     def closed(self) -> bool:

@@ -58,6 +58,14 @@ def know_again(vertices: Floats, faces: NDArray[np.int32], token: str) -> None:
     make_known(vertices, faces, None, token)
 
 
+def rename(vertices: Floats, faces: NDArray[np.int32]) -> None:
+    """Give a mesh that has moved in place another token: pickled hits of before don't find it."""
+    name = _names.pop(id(vertices), None)
+    if name is not None:
+        _meshes.pop(name.token, None)
+    make_known(vertices, faces, None)
+
+
 def mesh_of(name: MeshName) -> tuple[Floats, NDArray[np.int32]] | None:
     """The mesh of that name, if this process holds it, or it is stored.
 

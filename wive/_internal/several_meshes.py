@@ -74,16 +74,18 @@ def name_the_mesh(joined: Joined) -> None:
         _make_alone(f"meshes[{i}]: ", *_part(vertices, faces, geoms, i))
 
 
-def refitted_mesh(
-    tracer: Tracer, faces: NDArray[np.int32], geoms: Geoms, geom: int, vertices: ArrayLike, real: Real
-) -> Tracer:
-    """A tracer whose mesh `geom` has its vertices at new positions.
-
-    Raises ValueError or TypeError that names a vertex as it is numbered in that mesh.
-    """
-    i = arguments.integer("geom", geom, 0, len(geoms) - 1)
+def moved_rows(geoms: Geoms, i: int, vertices: ArrayLike, real: Real) -> Floats:
+    """New positions of mesh `i`; ValueError or TypeError if they aren't as many as before."""
     first, last = geoms.vertices[i : i + 2].tolist()
-    rows = arguments.moved_vertices(vertices, last - first, real, f"those of mesh {i}")
+    return arguments.moved_vertices(vertices, last - first, real, f"those of mesh {i}")
+
+
+def refitted_mesh(tracer: Tracer, faces: NDArray[np.int32], geoms: Geoms, i: int, rows: Floats) -> Tracer:
+    """A tracer whose mesh `i` has its vertices at `rows`.
+
+    Raises ValueError that names a vertex as it is numbered in that mesh.
+    """
+    first, last = geoms.vertices[i : i + 2].tolist()
     points = tracer.bvh.vertices
     expect_room(points.size, points.dtype)
     points = points.copy()
