@@ -25,6 +25,7 @@ from wive.backend import Backend, backends
 from wive.camera import Camera
 from wive.closest import Closest
 from wive.colors import load_colors
+from wive.estimating import Estimate, estimate
 from wive.geoms import Geoms
 from wive.hits import Hits, Stats
 from wive.loading import load
@@ -41,6 +42,7 @@ __all__ = [
     "Camera",
     "Closest",
     "EquirectangularCamera",
+    "Estimate",
     "Geoms",
     "Hits",
     "OrthographicCamera",
@@ -50,6 +52,7 @@ __all__ = [
     "Stats",
     "backends",
     "embreex",
+    "estimate",
     "load",
     "load_colors",
     "load_mesh",
