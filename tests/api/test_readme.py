@@ -31,7 +31,7 @@ def run(program: str, folder: Path) -> str:
 def test_the_readmes_program_runs(tmp_path: Path) -> None:
     (program,) = programs("README.md")
     printed = run(program, tmp_path).strip()
-    assert printed == "[ 1.  1. inf] [1 1 0]"
+    assert printed == "[ 1.  1. inf] [ 0  1 -1]"
     assert program.endswith(f"# {printed}\n")
 
 
