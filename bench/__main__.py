@@ -14,6 +14,7 @@ BENCHES = {
     "gpu": "wive's Warp kernels on a GPU: the core's bits, speed against Warp's own query, streams",
     "inflight": "speed and latency over the rays in flight, and what memory's latency allows",
     "latency": "seconds per call over batch sizes: every backend, wp.mesh_query_ray, embreex",
+    "moving": "one mesh that moves in a scene: refit(geom=), refit, a new scene, a second scene",
     "order": "steps per ray for five orders of visiting a node's children, and their speed",
     "paper": "the WiVe paper's tables: path tracing with its traversals and with Embree's",
     "packets": "pictures from near and far with packets, over the same without",

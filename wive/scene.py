@@ -201,10 +201,11 @@ class Scene(Queries, PointQueries):
         """Move the vertices: new positions, the same faces.
 
         The tree keeps its shape and gets new boxes, in a sixth of the time that building takes. Hits are
-        those of a new scene, bit for bit; only their speed depends on how well the old shape suits the new
-        positions. It suits them well if the mesh bends or moves as a whole. If neighbours part, rays take
-        more steps with every refit, and a new `Scene` is worth its price. Triangles that lose their area are
-        no longer hit; if one that had none gains some, the tree is built anew, and so are compressed trees.
+        those of a new scene, bit for bit (in `fast`, except of rays at edges and vertices); only
+        their speed depends on how well the old shape suits the new positions. It suits them well if
+        the mesh bends or moves as a whole. If neighbours part, rays take more steps with every
+        refit, and a new `Scene` is worth its price. Triangles that lose their area are no longer
+        hit; if one that had none gains some, the tree is built anew, and so are compressed trees.
 
         Queries that run in other threads meanwhile finish on the old positions. A tree that was taken from
         `tree` before, for `wive.warp_kernels`, keeps them: take it again. Of two refits at once the one that

@@ -60,6 +60,12 @@ def test_bench_closest_compares_points_and_insides(bench: Callable[..., dict[str
     assert content["contains"][0]["contains"] > 0
 
 
+def test_bench_moving_times_every_way(bench: Callable[..., dict[str, Any]]) -> None:
+    (row,) = bench("moving", "--scenes", SCENE)["rows"]
+    assert row["moving"] > 100
+    assert min(row[way] for way in ("geom_ms", "held_ms", "first_ms", "refit_ms", "build_ms")) > 0
+
+
 def test_bench_paper_renders_embrees_picture(bench: Callable[..., dict[str, Any]]) -> None:
     content = bench("paper", "--scenes", SCENE)
     assert content["rows"]
