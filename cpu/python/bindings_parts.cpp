@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <cstring>
 #include <memory>
+#include <mutex>
 #include <span>
 #include <utility>
 #include <vector>
@@ -108,7 +109,10 @@ void PyBvh::prepare_part(const Offsets& first_faces, std::size_t i) {
            "first_faces: expected where the faces of each mesh begin, and a mesh");
     if (!tree.can_change()) return;
     const Released released;
-    const std::lock_guard lock(preparing_);
+    // Never waits: a process that was forked while another thread prepared would find the lock taken for ever. A mesh
+    // that isn't prepared is refitted with all others.
+    const std::unique_lock lock(preparing_, std::try_to_lock);
+    if (!lock) return;
     Threads threads(thread_count(0));
     if (!part_mover<Real>()) mover_ = std::make_unique<PartMover<Real>>(whole, offsets, threads);
     part_mover<Real>()->prepare(tree, i, threads);
