@@ -1,11 +1,16 @@
 """How many threads calls use that don't say it."""
 
+import contextlib
 import os
+from collections.abc import Iterator
 
 from wive import _cpu
 from wive._internal import arguments
 
 VARIABLE = "WIVE_NUM_THREADS"
+
+# What `set_threads` said; 0 is None.
+_asked = 0
 
 
 def set_threads(count: int | None) -> None:
@@ -17,7 +22,24 @@ def set_threads(count: int | None) -> None:
 
     Raises ValueError if count is less than 1, TypeError if it is no integer.
     """
-    _cpu.set_thread_count(arguments.threads(count))
+    global _asked
+    _asked = arguments.threads(count)
+    _cpu.set_thread_count(_asked)
+
+
+@contextlib.contextmanager
+def at_most(count: int | None) -> Iterator[None]:
+    """A block whose calls, and those of other threads meanwhile, use no more than `count` threads.
+
+    For calls that have no `threads=`: unpickling builds a tree, and verifying reads all of one. None changes
+    nothing.
+    """
+    if count is not None and not 0 < _asked <= count:
+        _cpu.set_thread_count(count)
+    try:
+        yield
+    finally:
+        _cpu.set_thread_count(_asked)
 
 
 def set_by_environment() -> None:
