@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -86,10 +86,7 @@ def render(
 
     >>> wive.write_picture("room.png", wive.render(scene, shading="ao"))
     """
-    unknown = how.keys() - How.__annotations__.keys()
-    if unknown:
-        raise TypeError(f"render() got an unexpected keyword argument {min(unknown)!r}")
-    settings = Settings(
+    settings = settings_of(
         shading=shading,
         width=width,
         height=height,
@@ -100,6 +97,14 @@ def render(
         **how,
     )
     return render_counted(scene, camera, settings, progress=arguments.flag("progress", progress)).image
+
+
+def settings_of(**given: Any) -> Settings:
+    """The settings with these fields, checked."""
+    unknown = given.keys() - Settings.__dataclass_fields__.keys()
+    if unknown:
+        raise TypeError(f"render() got an unexpected keyword argument {min(unknown)!r}")
+    return Settings(**given)
 
 
 class Picture(NamedTuple):
@@ -116,6 +121,41 @@ def render_counted(
     """The picture that `render` returns."""
     if not isinstance(scene, Scene):
         raise TypeError(f"scene must be a wive.Scene, got {type(scene).__name__}")
+    with _cpu.DefaultFloats():  # the caller's floating-point environment would round otherwise
+        scene = scene._at_rest()
+        _cpu.expect_memory(settings.height * settings.width * 3 * np.dtype(np.float32).itemsize)
+        plan = planned(scene, camera, settings)
+        image = np.zeros(plan.shape, np.float32)
+        with progress_bar(settings.height, "row", "rendering", show=progress) as advance:
+            rays = render_rows(scene, plan, image, 0, settings.height, advance)
+        if plan.shading in EXPOSABLE:
+            expose(image, exposure_factor(image[:, :, 1], settings.exposure))
+        return Picture(image, plan.shading, rays)
+
+
+class Plan(NamedTuple):
+    """All that a picture depends on besides the scene: rows that are rendered apart make one picture."""
+
+    settings: Settings
+    camera: Perspective
+    albedo: Albedo
+    shading: str
+    reach: float
+
+    @property
+    def frame(self) -> NDArray[np.float64]:
+        """(4,3) the camera's eye, and the vectors that span the picture."""
+        return self.camera._frame(self.settings.width, self.settings.height)
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Of the picture."""
+        channels = () if self.shading == "depth" else (3,)
+        return self.settings.height, self.settings.width, *channels
+
+
+def planned(scene: Scene, camera: Perspective | None, settings: Settings) -> Plan:
+    """What the settings mean for a scene that no refit changes meanwhile."""
     if not (camera is None or isinstance(camera, Perspective)):
         raise TypeError(
             "camera must be a wive.Camera or wive.PinholeCamera, or None for one that shows the scene, "
@@ -126,33 +166,24 @@ def render_counted(
             "scene must be of float32 vertices to be path-traced, got float64: use another shading, or "
             "make one with (vertices - vertices.mean(axis=0)).astype(np.float32)"
         )
-    with _cpu.DefaultFloats():  # the caller's floating-point environment would round otherwise
-        return _rendered(scene._at_rest(), camera, settings, progress)
-
-
-def _rendered(scene: Scene, camera: Perspective | None, settings: Settings, progress: bool) -> Picture:
-    """The picture of a scene that no refit changes meanwhile."""
     arguments.refuse_lacking(scene.backend, scene._tracer.lacks, {"threads": settings.threads})
     albedo = albedo_of(settings.albedo, scene)
     width, height = settings.width, settings.height
-    channels = () if settings.shading == "depth" else (3,)
-    _cpu.expect_memory(height * width * 3 * np.dtype(np.float32).itemsize)
-    image = np.zeros((height, width, *channels), np.float32)
     if camera is None:
         camera = default_camera(scene, aspect=width / height, threads=settings.threads)
-    frame = camera._frame(width, height)
-    shading, reach = _resolved(scene, frame, settings)
-    title = "rendering"
-    if shading == "path":
-        look = _look(settings, albedo, frame, camera)
-        with progress_bar(height, "row", title, show=progress) as advance:
-            rays = _trace_paths(scene, frame.astype(np.float32), image, look, advance)
-    else:
-        with progress_bar(height, "row", title, show=progress) as advance:
-            rays = _shade(scene, frame, image, shading, albedo, reach, settings, advance)
-    if shading in EXPOSABLE:
-        _expose(image, settings.exposure)
-    return Picture(image, shading, rays)
+    shading, reach = _resolved(scene, camera._frame(width, height), settings)
+    return Plan(settings, camera, albedo, shading, reach)
+
+
+def render_rows(
+    scene: Scene, plan: Plan, image: Image, begin: int, end: int, advance: Callable[[int], object]
+) -> int:
+    """Render rows [begin, end) into the image of the whole picture; returns how many rays were traced."""
+    frame, settings = plan.frame, plan.settings
+    if plan.shading == "path":
+        look = _look(settings, plan.albedo, frame, plan.camera)
+        return _trace_paths(scene, frame.astype(np.float32), image, look, begin, end, advance)
+    return _shade(scene, plan, image, begin, end, advance)
 
 
 def _resolved(scene: Scene, frame: NDArray[np.float64], settings: Settings) -> tuple[str, float]:
@@ -170,26 +201,20 @@ def _resolved(scene: Scene, frame: NDArray[np.float64], settings: Settings) -> t
 
 
 def _shade(
-    scene: Scene,
-    frame: NDArray[np.float64],
-    image: Image,
-    shading: str,
-    albedo: Albedo,
-    reach: float,
-    settings: Settings,
-    advance: Callable[[int], object],
+    scene: Scene, plan: Plan, image: Image, begin: int, end: int, advance: Callable[[int], object]
 ) -> int:
     """Render by the scene's queries."""
-    spp, threads = settings.spp, settings.threads
-    if shading == "depth":
-        return render_depth(image, frame, scene, threads, advance)
+    frame, spp, threads = plan.frame, plan.settings.spp, plan.settings.threads
+    if plan.shading == "depth":
+        return render_depth(image, frame, scene, threads, begin, end, advance)
     kinds = {"normals": NormalColours, "headlight": Headlight}
+    seed = plan.settings.seed
     shader = (
-        AmbientOcclusion(scene, albedo, settings.seed, threads, reach, spp)
-        if shading == "ao"
-        else kinds[shading](scene, albedo, settings.seed, threads)
+        AmbientOcclusion(scene, plan.albedo, seed, threads, plan.reach, spp)
+        if plan.shading == "ao"
+        else kinds[plan.shading](scene, plan.albedo, seed, threads)
     )
-    return shader.render(image, frame, spp, advance)
+    return shader.render(image, frame, spp, begin, end, advance)
 
 
 def _look(settings: Settings, albedo: Albedo, frame: NDArray[np.float64], camera: Perspective) -> Look:
@@ -201,31 +226,43 @@ def _look(settings: Settings, albedo: Albedo, frame: NDArray[np.float64], camera
 
 
 def _trace_paths(
-    scene: Scene, frame: Image, image: Image, look: Look, advance: Callable[[int], object]
+    scene: Scene,
+    frame: Image,
+    image: Image,
+    look: Look,
+    begin: int,
+    end: int,
+    advance: Callable[[int], object],
 ) -> int:
-    render_rows = scene._tracer.rows_renderer(frame, image, look)
+    trace = scene._tracer.rows_renderer(frame, image, look)
     rays = 0
-    for begin, end in _bands(len(image), image.shape[1] * look.spp, scene.device):
-        rays += render_rows(begin, end)
-        advance(end - begin)
+    for first, last in _bands(begin, end, image.shape[1] * look.spp, scene.device):
+        rays += trace(first, last)
+        advance(last - first)
     return rays
 
 
-def _expose(image: Image, exposure: float | str) -> None:
-    """Multiply the picture in place."""
+def exposure_factor(green: Image | None, exposure: float | str) -> np.float32:
+    """By what the whole picture is multiplied; "auto" looks at its green, which is most of the luminance."""
     if exposure == "auto":
-        middle = image[:, :, 1]  # green is most of the luminance
-        bright = float(np.quantile(middle, 0.9))
+        assert green is not None
+        bright = float(np.quantile(green, 0.9))
         factor = EXPOSED / bright if bright > 0 else 1.0
     else:
         factor = 2.0 ** float(exposure)
+    return np.float32(min(factor, float(np.finfo(np.float32).max)))
+
+
+def expose(image: Image, factor: np.float32) -> Image:
+    """The picture, multiplied in place."""
     if factor != 1:
         with np.errstate(over="ignore"):
-            image *= np.float32(min(factor, float(np.finfo(np.float32).max)))
+            image *= factor
+    return image
 
 
-def _bands(height: int, row_paths: int, device: str | None) -> Iterator[tuple[int, int]]:
+def _bands(begin: int, end: int, row_paths: int, device: str | None) -> Iterator[tuple[int, int]]:
     paths = BAND_PATHS if device in (None, "cpu") else CUDA_BAND_PATHS
     rows = max(1, paths // row_paths)
-    for begin in range(0, height, rows):
-        yield begin, min(begin + rows, height)
+    for first in range(begin, end, rows):
+        yield first, min(first + rows, end)

@@ -8,13 +8,16 @@
 docs/dask.md says how to run it on a cluster.
 """
 
+import importlib
+
 try:
-    import dask.array as _
+    importlib.import_module("dask.array")
 except ImportError as error:
     raise ImportError(f"wive.dask needs dask ({error}): pip install 'wive[dask]'") from error
 
 from wive.dask.all_hits import DaskAllHits
 from wive.dask.hits import DaskHits
+from wive.dask.pictures import render
 from wive.dask.queries import count, intersect, intersect_all, occluded
 
-__all__ = ["DaskAllHits", "DaskHits", "count", "intersect", "intersect_all", "occluded"]
+__all__ = ["DaskAllHits", "DaskHits", "count", "intersect", "intersect_all", "occluded", "render"]

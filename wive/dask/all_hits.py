@@ -20,7 +20,8 @@ class DaskAllHits(HitCollection):
     Arrays with one row per hit, (h,) below, have chunks of unknown sizes (NaN), as if a mask had chosen the
     rows: `compute_chunk_sizes()` finds them. Rays of a leading shape such as (h,w) are numbered in C order.
     A chunk is traced once for all arrays that are computed together. `hits.persist()` keeps the traced chunks
-    in memory, `hits.compute()` returns the `wive.AllHits` of all rays, `hits.to_delayed()` that of each chunk.
+    in memory; `hits.compute()` returns the `wive.AllHits` of all rays, `hits.to_delayed()` those of each
+    chunk.
     """
 
     @property
@@ -34,7 +35,7 @@ class DaskAllHits(HitCollection):
         counts = self.counts
         if 0 in counts.chunks[0]:  # which dask's cumsum fails at
             counts = counts.rechunk((tuple(size for size in counts.chunks[0] if size) or (0,),))
-        return da.concatenate([da.zeros(1, np.int64), da.cumsum(counts, axis=0, dtype=np.int64)])
+        return da.concatenate([da.zeros(1, dtype=np.int64), da.cumsum(counts, axis=0, dtype=np.int64)])
 
     @property
     def ray(self) -> da.Array:
@@ -105,7 +106,9 @@ def joined_all_hits(chunks: Sequence[AllHits]) -> AllHits:
     """The hits of all chunks, one after another."""
     hits = object.__new__(AllHits)
     counts = np.concatenate([np.zeros(1, np.int64), *(np.diff(chunk.offsets) for chunk in chunks)])
-    arrays = {name: np.concatenate([getattr(chunk, name) for chunk in chunks]) for name in ("t", "prim", "uv")}
+    arrays = {
+        name: np.concatenate([getattr(chunk, name) for chunk in chunks]) for name in ("t", "prim", "uv")
+    }
     geoms = chunks[0]._geoms
     vars(hits).update(offsets=np.cumsum(counts), **arrays, **mesh_attributes(chunks[0]))
     if geoms is not None:

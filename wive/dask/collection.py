@@ -14,6 +14,9 @@ from wive.dask.carried import CarriedScene
 from wive.dask.rays import ChunkedRays, empty_like, whole
 from wive.scene import Scene
 
+# The arrays of hits that a query fills.
+TRACED = "t", "prim", "uv"
+
 
 class HitCollection(DaskMethodsMixin):
     """Hits that dask computes, chunk by chunk; arrays of them share the trace of a chunk.

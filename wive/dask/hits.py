@@ -15,11 +15,9 @@ from wive._internal.interpolation import vertex_values_of
 from wive._internal.known_meshes import mesh_attributes
 from wive._internal.shaped import ShapedHits
 from wive._internal.shapes import Leading
-from wive.dask.collection import HitCollection
+from wive.dask.collection import TRACED, HitCollection
 from wive.dask.rays import Given, as_vectors, labelled, same_shape
 from wive.hits import Hits
-
-TRACED = "t", "prim", "uv"
 
 
 class DaskHits(HitCollection):

@@ -55,9 +55,9 @@ def chunked_rays(origins: Given, directions: Given, tmin: Given, tmax: Given) ->
             "origins and directions must have one shape, or one of them (3,) if all rays share it, "
             f"got {one} and {other}"
         )
-    longer = max((value for value in vectors if isinstance(value, da.Array)), key=lambda value: value.ndim)
     leading = max(one, other, key=len)[:-1]
-    chunks = longer.chunks[:-1]
+    lazy = sorted((value for value in vectors if isinstance(value, da.Array)), key=lambda value: -value.ndim)
+    chunks = lazy[0].chunks[:-1] or ("auto",) * len(leading)
     pairs = [labelled(name, value, leading, chunks) for name, value in zip(NAMES, vectors, strict=False)]
     for name, value in zip(NAMES[2:], (tmin, tmax), strict=True):
         limit = _as_array(name, value, "a real number or one per ray")
@@ -66,7 +66,7 @@ def chunked_rays(origins: Given, directions: Given, tmin: Given, tmax: Given) ->
                 f"{name} must be one number or have shape {leading}, one per ray, got shape {limit.shape}"
             )
         pairs.append(labelled(name, limit, leading, chunks, tail=()))
-    return ChunkedRays(tuple(pairs), leading, longer._meta)
+    return ChunkedRays(tuple(pairs), leading, lazy[0]._meta)
 
 
 def as_vectors(name: str, value: Given) -> Any:
@@ -83,7 +83,7 @@ def labelled(
     name: str,
     array: Any,
     leading: Shape,
-    chunks: Sequence[tuple[float, ...]],
+    chunks: Sequence[Any],
     tail: tuple[int, ...] = (VECTOR,),
 ) -> tuple[Any, tuple[int, ...] | None]:
     """The array with the labels of its axes; NumPy's in the chunks of the others, or whole if shared."""

@@ -71,13 +71,13 @@ class Shader:
         """(n,3) or (n,1) radiance at the hits, and how many rays were traced for it."""
         raise NotImplementedError
 
-    def render(self, image: Image, frame: Float64, spp: int, advance: Advance) -> int:
-        """Write the mean of all samples to the image; returns how many rays were traced."""
+    def render(self, image: Image, frame: Float64, spp: int, begin: int, end: int, advance: Advance) -> int:
+        """Write the mean of all samples to rows [begin, end); returns how many rays were traced."""
         height, width = image.shape[:2]
         samples = -(-spp // self.rays_per_camera_ray)
         rays = 0
-        for begin, end in bands(height, width):
-            band = Band(frame, begin, end, width, height, self.scene)
+        for first, last in bands(begin, end, width):
+            band = Band(frame, first, last, width, height, self.scene)
             sums = np.zeros((len(band.pixels), 3), np.float64)
             for sample in range(samples):
                 hits, directions, hit = band.hits(sample, self.seed, self.threads)
@@ -86,8 +86,9 @@ class Shader:
                     sums += self.background
                 sums[hit] += values - self.background
                 rays += len(band.pixels) + traced
-                advance(_share(end - begin, sample + 1, samples) - _share(end - begin, sample, samples))
-            image[begin:end] = (sums / samples).reshape(end - begin, width, 3)
+                done, before = (_share(last - first, count, samples) for count in (sample + 1, sample))
+                advance(done - before)
+            image[first:last] = (sums / samples).reshape(last - first, width, 3)
         return rays
 
 
@@ -161,11 +162,11 @@ def _share(rows: int, done: int, samples: int) -> int:
     return rows * done // samples
 
 
-def bands(height: int, width: int) -> Iterator[tuple[int, int]]:
-    """Rows [begin, end) that are traced together."""
+def bands(begin: int, end: int, width: int) -> Iterator[tuple[int, int]]:
+    """Those of rows [begin, end) that are traced together."""
     rows = max(1, BAND_PIXELS // width)
-    for begin in range(0, height, rows):
-        yield begin, min(begin + rows, height)
+    for first in range(begin, end, rows):
+        yield first, min(first + rows, end)
 
 
 def dots(a: NDArray[np.float64], b: Floats) -> NDArray[np.float64]:
@@ -173,14 +174,22 @@ def dots(a: NDArray[np.float64], b: Floats) -> NDArray[np.float64]:
     return np.asarray(a[:, 0] * b[:, 0] + a[:, 1] * b[:, 1] + a[:, 2] * b[:, 2])
 
 
-def render_depth(image: Image, frame: Float64, scene: Scene, threads: int | None, advance: Advance) -> int:
-    """Write t of the rays through the pixels' centres, inf on a miss, to image (h,w)."""
+def render_depth(
+    image: Image,
+    frame: Float64,
+    scene: Scene,
+    threads: int | None,
+    begin: int,
+    end: int,
+    advance: Advance,
+) -> int:
+    """Write t of the rays through the pixels' centres, inf on a miss, to rows [begin, end) of image (h,w)."""
     height, width = map(int, image.shape)
-    for begin, end in bands(height, width):
-        eye, centre, right, top = frame
-        x, y = pixel_centres(width), -pixel_centres(height)[begin:end]
-        directions = (centre + y[:, None, None] * top) + x[:, None] * right
+    eye, centre, right, top = frame
+    x, y = pixel_centres(width), -pixel_centres(height)
+    for first, last in bands(begin, end, width):
+        directions = (centre + y[first:last, None, None] * top) + x[:, None] * right
         rays = np.ascontiguousarray(directions.reshape(-1, 3), np.dtype(scene.precision))
-        image[begin:end] = scene.intersect(eye, rays, threads=threads).t.reshape(end - begin, width)
-        advance(end - begin)
-    return height * width
+        image[first:last] = scene.intersect(eye, rays, threads=threads).t.reshape(last - first, width)
+        advance(last - first)
+    return (end - begin) * width
