@@ -10,6 +10,7 @@ BENCHES = {
     "build": "build time, SAH cost and memory against native Embree, 100 thousand to 20 million triangles",
     "closest": "closest points and insides against Open3D and trimesh, one core",
     "cliffs": "inputs on which the cost of a ray could jump, over usual ones",
+    "dask": "wive.dask on threads and two processes against one call of the scene",
     "embree": "single rays against native Embree: speed, build time, SAH, memory",
     "gpu": "wive's Warp kernels on a GPU: the core's bits, speed against Warp's own query, streams",
     "inflight": "speed and latency over the rays in flight, and what memory's latency allows",

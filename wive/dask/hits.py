@@ -127,7 +127,7 @@ class DaskHits(HitCollection):
 def joined_hits(chunks: Any) -> Hits:
     """The hits of all chunks, nested as their keys are."""
     first = chunks
-    while isinstance(first, list):
+    while isinstance(first, list | tuple):
         first = first[0]
     t, prim, uv = (_joined(chunks, name) for name in TRACED)
     home = vars(first).get("_home", first)
@@ -146,7 +146,7 @@ def joined_hits(chunks: Any) -> Hits:
 
 def _joined(chunks: Any, name: str) -> Any:
     def arrays(part: Any) -> Any:
-        if isinstance(part, list):
+        if isinstance(part, list | tuple):
             return [arrays(one) for one in part]
         array = getattr(part, name)
         return [array] if name == "uv" else array  # as deep as it has axes

@@ -1,0 +1,162 @@
+"""wive.dask on threads and on two processes over one call of the scene, on as many cores.
+
+20 million incoherent rays, origins uniform in the scene's box, lie ready in memory before the time is taken:
+of the process, or of the workers, which keep the hits. `speed`: seconds of one call of `Scene.intersect` on
+two threads over those of dask, in turn. Chunks have a million rays. Workers map a saved scene. `task_ms` is
+what dask takes per task on two processes, from chunks of one ray.
+"""
+
+import argparse
+import itertools
+import tempfile
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+import matplotlib
+import numpy as np
+from numpy.typing import NDArray
+
+import wive
+from bench.support import report
+from bench.support.options import scene_parser
+from bench.support.scenes import TERRAIN, SceneFolder
+from bench.support.timing import QUICK, Effort, compare_in_turn, wall_timed
+
+matplotlib.use("Agg")
+from matplotlib import pyplot
+from matplotlib.figure import Figure
+
+CORES = 2
+RAYS, CHUNK = 20_000_000, 1_000_000
+QUICK_RAYS, QUICK_CHUNK = 20_000, 2_000
+TASKS, QUICK_TASKS = 2_000, 50
+EFFORT = Effort(least=3, most=3)
+FAR = 1e30  # tmax, another one per run: dask keeps what it has computed
+CALL, THREADS, PROCESSES = "Scene.intersect", "wive.dask, threads", "wive.dask, processes"
+COLUMNS = ["scene", "triangles", "contender", "count", "speed", "low", "high", "mrays", "rounds"]
+
+
+def main(options: Sequence[str]) -> None:
+    """Runs the bench with command-line options."""
+    chosen = parse_options(options)
+    folder = SceneFolder(chosen.scene_dir)
+    scenes = folder.select(chosen.scenes, (TERRAIN,))
+    count, chunk = (QUICK_RAYS, QUICK_CHUNK) if chosen.quick else (RAYS, CHUNK)
+    rows: list[report.Row] = []
+    task_ms = 0.0
+    for name in scenes.names:
+        mesh = folder.load(name)
+        with tempfile.TemporaryDirectory() as place:
+            wive.Scene(mesh.vertices, mesh.faces).save(Path(place) / "scene")
+            scene = wive.load(Path(place) / "scene")
+            with contenders(scene, count, chunk, place) as (runs, seconds_of_tasks):
+                outcomes = compare_in_turn(
+                    [wall_timed(run) for run in runs.values()], QUICK if chosen.quick else EFFORT
+                )
+                tasks = QUICK_TASKS if chosen.quick else TASKS
+                task_ms = seconds_of_tasks(tasks) / tasks * 1e3
+            del scene
+        for contender, outcome in zip(runs, outcomes, strict=True):
+            rows.append(
+                {
+                    "scene": name,
+                    "triangles": len(mesh.faces),
+                    "contender": contender,
+                    "count": count,
+                    "speed": outcome.ratio,
+                    "low": outcome.low,
+                    "high": outcome.high,
+                    "mrays": count / outcome.our_seconds * 1e-6,
+                    "rounds": outcome.rounds,
+                }
+            )
+    report.print_table(rows, COLUMNS, f"Speed over one call of the scene on {CORES} threads")
+    print(f"\ndask takes {task_ms:.2f} ms per task on {CORES} processes")
+    whole = scenes.whole and not chosen.quick
+    report.save("dask", {"task_ms": task_ms, "rows": rows}, draw(rows), chosen.out, whole=whole)
+
+
+@contextmanager
+def contenders(
+    scene: wive.Scene, count: int, chunk: int, place: str
+) -> Iterator[tuple[dict[str, Callable[[], object]], Callable[[int], float]]]:
+    """Each way to trace the same rays, warmed up; and the seconds of so many tasks on two processes."""
+    import dask.array as da
+    from dask.base import compute
+    from distributed import Client, LocalCluster, wait
+
+    import wive.dask
+
+    low, high = scene.bounds
+    sizes = ((chunk,) * (count // chunk), (3,))
+    form = {"chunks": sizes, "dtype": np.float32, "meta": np.empty((0, 3), np.float32)}
+    made = [da.map_blocks(random_vectors, kind, low, high, **form) for kind in ("origins", "directions")]
+    arrays = compute(*made, scheduler="threads")
+    in_process = [da.from_array(array, chunks=(chunk, 3), name=False) for array in arrays]
+    far = itertools.count(1)
+    with (
+        LocalCluster(
+            n_workers=CORES, threads_per_worker=1, dashboard_address=None, local_directory=place
+        ) as cluster,
+        Client(cluster) as client,
+    ):
+        in_workers = [client.persist(one) for one in made]
+        wait(in_workers)
+
+        def on_processes() -> object:
+            hits = wive.dask.intersect(scene, in_workers[0], in_workers[1], tmax=FAR * next(far))
+            return wait(client.persist(hits))
+
+        def on_threads() -> object:
+            hits = wive.dask.intersect(scene, in_process[0], in_process[1], tmax=FAR * next(far))
+            return hits.persist(scheduler="threads", num_workers=CORES)
+
+        def seconds_of_tasks(tasks: int) -> float:
+            rays = da.zeros((tasks, 3), chunks=(1, 3))
+            start = time.perf_counter()
+            wait(client.persist(wive.dask.occluded(scene, rays, (0.0, 0.0, 1.0))))
+            return time.perf_counter() - start
+
+        runs: dict[str, Callable[[], object]] = {
+            CALL: lambda: scene.intersect(*arrays, threads=CORES),
+            THREADS: on_threads,
+            PROCESSES: on_processes,
+        }
+        for run in runs.values():
+            run()
+        yield runs, seconds_of_tasks
+
+
+def random_vectors(
+    kind: str,
+    low: NDArray[np.float32],
+    high: NDArray[np.float32],
+    block_info: dict[None, report.Row] | None = None,
+) -> NDArray[np.float32]:
+    """The vectors of a chunk, of a seed of their own."""
+    assert block_info is not None
+    about = block_info[None]
+    shape: tuple[int, int] = about["chunk-shape"]
+    random = np.random.default_rng((about["chunk-location"][0], kind == "origins"))
+    if kind == "directions":
+        return random.standard_normal(shape, np.float32)
+    return np.asarray(low + (high - low) * random.random(shape, np.float32), np.float32)
+
+
+def draw(rows: Sequence[report.Row]) -> Figure:
+    """Bars of Mray/s."""
+    figure, axes = pyplot.subplots(figsize=(6, 2.5), layout="constrained")
+    for row in rows:
+        bar = axes.barh(f"{row['scene']}, {row['contender']}", row["mrays"], color="tab:blue")
+        axes.bar_label(bar, [f"{row['speed']:.2f}"], padding=3)
+    axes.invert_yaxis()
+    axes.set_xlabel("Mray/s; beside the bars: over one call of the scene")
+    axes.margins(x=0.15)
+    return figure
+
+
+def parse_options(options: Sequence[str]) -> argparse.Namespace:
+    """The command line's choices."""
+    return scene_parser("dask", __doc__).parse_args(options)
