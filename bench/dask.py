@@ -10,7 +10,7 @@ import argparse
 import itertools
 import tempfile
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -45,7 +45,7 @@ def main(options: Sequence[str]) -> None:
     scenes = folder.select(chosen.scenes, (TERRAIN,))
     count, chunk = (QUICK_RAYS, QUICK_CHUNK) if chosen.quick else (RAYS, CHUNK)
     rows: list[report.Row] = []
-    task_ms = 0.0
+    task_ms = making_ns = 0.0
     for name in scenes.names:
         mesh = folder.load(name)
         with tempfile.TemporaryDirectory() as place:
@@ -57,6 +57,7 @@ def main(options: Sequence[str]) -> None:
                 )
                 tasks = QUICK_TASKS if chosen.quick else TASKS
                 task_ms = seconds_of_tasks(tasks) / tasks * 1e3
+            making_ns = making_seconds(scene, chunk) / chunk * 1e9
             del scene
         for contender, outcome in zip(runs, outcomes, strict=True):
             rows.append(
@@ -73,9 +74,12 @@ def main(options: Sequence[str]) -> None:
                 }
             )
     report.print_table(rows, COLUMNS, f"Speed over one call of the scene on {CORES} threads")
-    print(f"\ndask takes {task_ms:.2f} ms per task on {CORES} processes")
+    print(
+        f"\ndask takes {task_ms:.2f} ms per task on {CORES} processes, NumPy {making_ns:.0f} ns to make a ray"
+    )
     whole = scenes.whole and not chosen.quick
-    report.save("dask", {"task_ms": task_ms, "rows": rows}, draw(rows), chosen.out, whole=whole)
+    content = {"task_ms": task_ms, "making_ns": making_ns, "rows": rows}
+    report.save("dask", content, draw(rows), chosen.out, whole=whole)
 
 
 @contextmanager
@@ -129,11 +133,21 @@ def contenders(
         yield runs, seconds_of_tasks
 
 
+def making_seconds(scene: wive.Scene, chunk: int) -> float:
+    """Seconds to make the rays of a chunk."""
+    about = {None: {"chunk-location": (0, 0), "chunk-shape": (chunk, 3)}}
+    start = time.perf_counter()
+    low, high = scene.bounds
+    for kind in ("origins", "directions"):
+        random_vectors(kind, low, high, about)
+    return time.perf_counter() - start
+
+
 def random_vectors(
     kind: str,
     low: NDArray[np.float32],
     high: NDArray[np.float32],
-    block_info: dict[None, report.Row] | None = None,
+    block_info: Mapping[None, report.Row] | None = None,
 ) -> NDArray[np.float32]:
     """The vectors of a chunk, of a seed of their own."""
     assert block_info is not None

@@ -251,6 +251,20 @@ def pareto_scenes(content: report.Row) -> str:
     return markdown(["contender", *heads], lines)
 
 
+def dask_speed(content: report.Row) -> str:
+    """Speed of wive.dask over one call of the scene, and Mray/s."""
+    lines = [
+        [
+            row["contender"],
+            f"{row['speed']:.2f}",
+            f"{row['low']:.2f} to {row['high']:.2f}",
+            f"{row['mrays']:.1f}",
+        ]
+        for row in content["rows"]
+    ]
+    return markdown(["two cores", "speed", "quartiles", "Mray/s"], lines)
+
+
 TABLES: dict[str, Table] = {
     "embree.avx512_in_flight": embree_speed("avx512", "tuned"),
     "embree.avx512_one_ray": embree_speed("avx512", 1),
@@ -265,6 +279,7 @@ TABLES: dict[str, Table] = {
     "inflight.best": inflight_best,
     "order.means": order_means,
     "order.scenes": order_scenes,
+    "dask.speed": dask_speed,
     "pareto.means": pareto_means,
     "pareto.scenes": pareto_scenes,
 }

@@ -53,6 +53,15 @@ def test_bench_embree_finds_embrees_hits(bench: Callable[..., dict[str, Any]]) -
     assert content["trees"][0]["wive_sah"] > 0
 
 
+def test_bench_dask_compares_threads_and_processes(bench: Callable[..., dict[str, Any]]) -> None:
+    pytest.importorskip("distributed")
+    content = bench("dask", "--scenes", SCENE)
+    assert [row["contender"] for row in content["rows"]] == [
+        "Scene.intersect", "wive.dask, threads", "wive.dask, processes",
+    ]  # fmt: skip
+    assert content["task_ms"] > 0 and content["making_ns"] > 0
+
+
 def test_bench_closest_compares_points_and_insides(bench: Callable[..., dict[str, Any]]) -> None:
     content = bench("closest", "--scenes", SCENE)
     assert {row["kind"] for row in content["rows"]} == {"volume", "surface"}

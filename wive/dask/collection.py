@@ -61,7 +61,7 @@ class HitCollection(DaskMethodsMixin):
         )
 
     def to_delayed(self) -> list[Delayed]:
-        """The hits of each chunk, in C order, as Delayed objects, which share the trace with the arrays."""
+        """The hits of each chunk, in C order, as Delayed objects."""
         found: list[Delayed] = self._hits.to_delayed().ravel().tolist()
         return found
 

@@ -122,5 +122,7 @@ def whole(block: Any) -> Any:
 
 
 def empty_like(meta: Any, dtype: Any, ndim: int) -> Any:
-    """The `meta` of results."""
+    """The `meta` of results: of NumPy for masked arrays, else of the library of the rays."""
+    if isinstance(meta, np.ndarray):
+        return np.empty((0,) * ndim, dtype)
     return da.utils.meta_from_array(meta, ndim=ndim, dtype=np.dtype(dtype))
