@@ -39,13 +39,19 @@ def in_chunks(array: np.ndarray, chunks=(100, 3)):
 
 def same(found, expected: np.ndarray) -> None:
     """A dask array that says before what it is when computed, equal to NumPy's."""
-    assert isinstance(found, da.Array)
-    computed = found.compute()
-    assert type(computed) is type(found._meta) is np.ndarray
-    assert computed.dtype == found.dtype == found._meta.dtype == expected.dtype
-    assert computed.ndim == found.ndim == found._meta.ndim
-    assert all(a == b or math.isnan(a) for a, b in zip(found.shape, computed.shape, strict=True))
-    np.testing.assert_array_equal(computed, expected)
+    all_same([(found, expected)])
+
+
+def all_same(pairs: list[tuple]) -> None:
+    """Dask arrays, computed together."""
+    all_computed = dask.compute(*(found for found, _ in pairs))
+    for (found, expected), computed in zip(pairs, all_computed, strict=True):
+        assert isinstance(found, da.Array)
+        assert type(computed) is type(found._meta) is np.ndarray
+        assert computed.dtype == found.dtype == found._meta.dtype == expected.dtype
+        assert computed.ndim == found.ndim == found._meta.ndim
+        assert all(a == b or math.isnan(a) for a, b in zip(found.shape, computed.shape, strict=True))
+        np.testing.assert_array_equal(computed, expected)
 
 
 @pytest.fixture
@@ -72,14 +78,13 @@ def test_every_array_of_hits_is_that_of_the_scene(chunks, options):
     expected = scene.intersect(ORIGINS, DIRECTIONS)
     hits = wive.dask.intersect(scene, in_chunks(ORIGINS, chunks), in_chunks(DIRECTIONS, (250, 3)))
     assert hits.shape == hits.t.shape == (COUNT,) and len(hits) == COUNT
-    for name in OF_HITS:
-        same(getattr(hits, name), getattr(expected, name))
-    for name in METHODS:
-        same(getattr(hits, name)(), getattr(expected, name)())
+    pairs = [(getattr(hits, name), getattr(expected, name)) for name in OF_HITS]
+    pairs += [(getattr(hits, name)(), getattr(expected, name)()) for name in METHODS]
     for directions in (DIRECTIONS, in_chunks(DIRECTIONS, chunks), (0.0, 0.0, 1.0)):
-        same(hits.spawn(directions), expected.spawn(np.asarray(directions)))
+        pairs.append((hits.spawn(directions), expected.spawn(np.asarray(directions))))
     for values in (scene.vertices, scene.vertices[:, 0].astype(np.float16)):
-        same(hits.interpolate(values), expected.interpolate(values))
+        pairs.append((hits.interpolate(values), expected.interpolate(values)))
+    all_same(pairs)
     whole = hits.compute()
     assert_same_hits(whole, expected)
     np.testing.assert_array_equal(whole.points(), expected.points())
@@ -93,10 +98,9 @@ def test_every_array_of_all_hits_is_that_of_the_scene(chunks):
     rays = in_chunks(ORIGINS, chunks), in_chunks(DIRECTIONS, (250, 3))
     hits = wive.dask.intersect_all(scene, *rays, 0.1, in_chunks(LIMITS, 77))
     assert len(hits) == COUNT and len(expected.t) > 200
-    for name in OF_ALL_HITS:
-        same(getattr(hits, name), getattr(expected, name))
-    for name in ("points", "normals"):
-        same(getattr(hits, name)(), getattr(expected, name)())
+    pairs = [(getattr(hits, name), getattr(expected, name)) for name in OF_ALL_HITS]
+    pairs += [(getattr(hits, name)(), getattr(expected, name)()) for name in ("points", "normals")]
+    all_same(pairs)
     chunk_hits = dask.compute(*hits.to_delayed())
     assert sum(map(len, chunk_hits)) == COUNT
     for whole in (hits.compute(), hits.persist().compute()):
@@ -117,6 +121,24 @@ def test_limits_are_numbers_or_arrays_in_any_chunks(name):
             least = low.compute() if isinstance(low, da.Array) else low
             same(query(scene, *rays, low, high), expected(ORIGINS, DIRECTIONS, least, LIMITS))
     same(query(scene, *rays, tmin=3, tmax=2), expected(ORIGINS, DIRECTIONS, 3, 2))
+
+
+def test_triangles_that_are_touched_count():
+    scene = wive.Scene([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
+    edge = in_chunks(np.array([[0.5, 0, 1], [0, 0.5, 1], [0.5, 0.5, 1], [0.2, 0.2, 1]], np.float32), (2, 3))
+    for touching in (False, True):
+        expected = scene.count(edge.compute(), (0, 0, -1), touching=touching)
+        same(wive.dask.count(scene, edge, (0, 0, -1), touching=touching), expected)
+        every = wive.dask.intersect_all(scene, edge, (0, 0, -1), touching=touching)
+        same(every.counts, expected)
+    assert expected.tolist() == [1, 1, 1, 1]
+
+
+def test_masked_rays_miss():
+    scene = scene_of()
+    masked = np.ma.masked_array(ORIGINS, np.arange(3 * COUNT).reshape(-1, 3) % 7 == 0)
+    origins = da.ma.masked_array(in_chunks(ORIGINS), in_chunks(np.ma.getmaskarray(masked)))
+    same(wive.dask.intersect(scene, origins, in_chunks(DIRECTIONS)).t, scene.intersect(masked, DIRECTIONS).t)
 
 
 @pytest.mark.parametrize("row", [(0.5, 0.5, -2.0), np.array([0.5, 0.5, -2.0], np.float32)])
@@ -182,6 +204,14 @@ def test_rays_that_a_mask_chose_are_in_chunks_of_unknown_sizes():
         every.ray  # noqa: B018
     with pytest.raises(ValueError, match=r"^directions must be a dask array, as the rays are in chunks"):
         wive.dask.intersect(scene, origins, DIRECTIONS)
+    for other in (
+        in_chunks(DIRECTIONS)[: first.mask.sum()],
+        in_chunks(DIRECTIONS, (50, 3))[da.repeat(hits.mask, 1)],
+    ):
+        with pytest.raises(
+            ValueError, match=r"^origins and directions must be in the same chunks, as some [^\n]*$"
+        ):
+            wive.dask.occluded(scene, origins, other)
 
 
 def test_arrays_that_are_computed_together_share_one_trace_per_chunk(traced):

@@ -99,9 +99,7 @@ def _opened(name: str, parts: tuple[Any, ...]) -> Scene:
         scene = _open.get(name)
         if scene is None:
             with at_most(process_threads()):
-                scene = _unpickled(*parts)
-                scene._bvh.verify()
-            _open[name] = scene
+                scene = _open[name] = _unpickled(*parts)
         _kept.append(scene)
         return scene
 
@@ -109,11 +107,12 @@ def _opened(name: str, parts: tuple[Any, ...]) -> Scene:
 def _unpickled(function: Any, arguments: tuple[Any, ...], state: Any = None) -> Scene:
     try:
         scene: Scene = function(*arguments)
-    except OSError as error:
-        where = f"worker on {socket.gethostname()}: {error}"
+        scene._bvh.verify()
+    except (OSError, ValueError) as error:
+        line = f"worker on {socket.gethostname()}: {error}"
         if isinstance(arguments[0], Place) and arguments[0].kind == "shared memory":
-            where += "; workers on other machines need a scene saved to a file that they see, and loaded"
-        raise type(error)(where) from error
+            line += "; workers on other machines need a scene saved to a file that they see, and loaded"
+        raise (type(error) if isinstance(error, OSError) else ValueError)(line) from error
     if state is not None:
         scene.__setstate__(state)
     return scene

@@ -11,7 +11,7 @@ from dask.delayed import Delayed
 
 from wive._internal.known_meshes import OfMesh
 from wive.dask.carried import CarriedScene
-from wive.dask.rays import ChunkedRays, empty_like, whole
+from wive.dask.rays import VECTOR, ChunkedRays, empty_like, whole
 from wive.scene import Scene
 
 # The arrays of hits that a query fills.
@@ -45,17 +45,16 @@ class HitCollection(DaskMethodsMixin):
         mesh, which hits from another process don't have.
         """
         labels = tuple(range(self._hits.ndim))
-        added = {} if columns is None else {-1: columns}
+        added = {} if columns is None else {VECTOR: columns}
         fixed = [self._hits, labels, name, None, self._carried if of_mesh else None, None]
         return da.blockwise(
             _read_chunk,
             (*labels, *added),
             *fixed,
             *given,
-            new_axes={} if any(-1 in (part or ()) for part in given[1::2]) else added,
+            new_axes={} if any(VECTOR in (part or ()) for part in given[1::2]) else added,
             dtype=dtype,
             meta=empty_like(self._meta, dtype, len(labels) + len(added)),
-            name=None,
             token=f"wive-{name}",
             **keywords,
         )

@@ -17,7 +17,7 @@ from wive._internal.rays import NAMES
 Given = da.Array | ArrayLike
 Shape = tuple[float, ...]  # NaN is an axis of unknown length
 
-# The label of the axis that holds a vector's three numbers; leading axes are numbered.
+# The label of the axis of a vector's numbers; leading axes are numbered.
 VECTOR = -1
 
 
@@ -66,6 +66,7 @@ def chunked_rays(origins: Given, directions: Given, tmin: Given, tmax: Given) ->
                 f"{name} must be one number or have shape {leading}, one per ray, got shape {limit.shape}"
             )
         pairs.append(labelled(name, limit, leading, chunks, tail=()))
+    _expect_aligned(pairs)
     return ChunkedRays(tuple(pairs), leading, lazy[0]._meta)
 
 
@@ -97,6 +98,21 @@ def labelled(
             )
         array = da.from_array(array, chunks=(*chunks, *((3,) for _ in tail)))
     return array, (*range(len(leading)), *tail)
+
+
+def _expect_aligned(pairs: Sequence[tuple[Any, tuple[int, ...] | None]]) -> None:
+    """Raise ValueError for chunks that dask can't align, as their sizes are unknown."""
+    (first, chunks), *others = [
+        (name, str(array.chunks[: len(labels) - (VECTOR in labels)]))
+        for name, (array, labels) in zip(NAMES, pairs, strict=True)
+        if labels and labels != (VECTOR,)
+    ]
+    for name, found in others:
+        if found != chunks and "nan" in found + chunks:
+            raise ValueError(
+                f"{first} and {name} must be in the same chunks, as some are of unknown sizes, got {chunks} "
+                f"and {found}: call compute_chunk_sizes() on both"
+            )
 
 
 def same_shape(one: Shape, other: Shape) -> bool:
