@@ -2,8 +2,11 @@
 
 import gc
 import math
+import os
 import pickle
 import re
+import subprocess
+import sys
 import threading
 
 import numpy as np
@@ -416,3 +419,14 @@ def test_scenes_on_a_warp_device_trace_there(device, traced):
         wive.dask.count(scene, *RAYS, threads=1)
     again = pickle.loads(pickle.dumps(carried(scene)[0]))
     assert again.scene.device == device
+
+
+def test_arrays_of_dasks_experiment_are_refused(tmp_path):
+    finished = subprocess.run(
+        [sys.executable, "-c", "import wive.dask"],
+        env={**os.environ, "DASK_ARRAY__QUERY_PLANNING": "True"},
+        cwd=tmp_path, capture_output=True, text=True, timeout=60, check=False,
+    )  # fmt: skip
+    assert finished.stderr.splitlines()[-1].startswith(
+        "ImportError: wive.dask needs dask's usual arrays, got"
+    )

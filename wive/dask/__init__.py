@@ -11,9 +11,14 @@ docs/dask.md says how to run it on a cluster.
 import importlib
 
 try:
-    importlib.import_module("dask.array")
+    _array = importlib.import_module("dask.array")
 except ImportError as error:
     raise ImportError(f"wive.dask needs dask ({error}): pip install 'wive[dask]'") from error
+if _array.Array.__module__ != "dask.array.core":
+    raise ImportError(
+        "wive.dask needs dask's usual arrays, got those of query planning, an experiment of dask: "
+        "leave dask's option array.query-planning out"
+    )
 
 from wive.dask.all_hits import DaskAllHits
 from wive.dask.hits import DaskHits

@@ -86,7 +86,7 @@ class DaskAllHits(HitCollection):
         return self._per_hit("normals", np.float64, 3, of_mesh=True)
 
     def _per_hit(self, name: str, dtype: Any, columns: int | None = None, of_mesh: bool = False) -> da.Array:
-        unknown = (math.nan,) * self._hits.npartitions
+        unknown = (math.nan,) * math.prod(self._hits.numblocks)
         return self._read(name, dtype, columns, of_mesh=of_mesh, adjust_chunks={0: unknown})
 
     def __len__(self) -> int:
@@ -95,7 +95,7 @@ class DaskAllHits(HitCollection):
 
     def __repr__(self) -> str:
         """Number of rays and of chunks."""
-        return f"DaskAllHits({self._hits.shape[0]} rays in {self._hits.npartitions} chunks)"
+        return f"DaskAllHits({self._hits.shape[0]} rays in {math.prod(self._hits.numblocks)} chunks)"
 
     def __dask_postcompute__(self) -> tuple[Any, tuple[()]]:
         """All chunks as one `wive.AllHits`."""

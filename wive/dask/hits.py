@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import dask.array as da
@@ -117,7 +118,7 @@ class DaskHits(HitCollection):
 
     def __repr__(self) -> str:
         """Shape and number of chunks."""
-        return f"DaskHits({self.shape} rays in {self._hits.npartitions} chunks)"
+        return f"DaskHits({self.shape} rays in {math.prod(self._hits.numblocks)} chunks)"
 
     def __dask_postcompute__(self) -> tuple[Any, tuple[()]]:
         """All chunks as one `wive.Hits`."""
