@@ -33,6 +33,7 @@ from wive.meshfile import load_mesh
 from wive.rendering import render, write_picture
 from wive.scene import Scene
 from wive.sensors import EquirectangularCamera, OrthographicCamera, PinholeCamera, SpinningLidar
+from wive.streams import Traced, stream, trace
 
 __version__ = "0.1.0"
 
@@ -50,6 +51,7 @@ __all__ = [
     "Scene",
     "SpinningLidar",
     "Stats",
+    "Traced",
     "backends",
     "embreex",
     "estimate",
@@ -58,6 +60,8 @@ __all__ = [
     "load_mesh",
     "render",
     "set_threads",
+    "stream",
+    "trace",
     "trimesh",
     "write_picture",
 ]

@@ -5,13 +5,14 @@ Shapes: n rays, v vertices, f faces, m inner nodes, b triangle blocks. Every arr
 Users call `wive.Scene`, which checks arguments; here only what memory safety needs is checked.
 """
 
-from collections.abc import Sequence
-from typing import Any, Literal, TypeAlias
+from collections.abc import Callable, Sequence
+from typing import Any, Literal, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 Real: TypeAlias = np.floating[Any]  # float32 or float64, the same for all arrays of a tree
+Result = TypeVar("Result")
 
 compiler: str  # the C++ compiler's name and version
 exact_source: str  # C++ text of the exact arithmetic, which the Warp kernels compile as well
@@ -48,6 +49,15 @@ def available_memory(root: str = "") -> int:
 
     2^64 - 1 if the system doesn't tell. root: a folder that holds proc and sys, for tests.
     """
+
+def report_to(hears: Callable[[float], object], work: Callable[[], Result]) -> Result:
+    """The result of `work`. Meanwhile, `hears` is told the fraction that is done of each call at hand.
+
+    Some ten times a second, on the calling thread. Exceptions that it raises end the call.
+    """
+
+def checksum(data: NDArray[np.uint8], threads: int = 0) -> int:
+    """64 bits of the bytes (n,), which must be C-contiguous."""
 
 def expect_memory(bytes: int) -> None:
     """Raise MemoryError unless as many bytes are available; amounts under 64 MiB are not checked."""

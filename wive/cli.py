@@ -13,6 +13,7 @@ from wive._internal import commands
 from wive._internal.picture import ALBEDOS, SHADINGS, SKIES, Settings
 from wive._internal.pictures.image_files import FORMATS
 from wive.backend import CPU_BACKENDS, WARP
+from wive.streams import PIECE, PIECE_ALL
 
 BAD_INPUT = 2
 INTERRUPTED = 130
@@ -31,8 +32,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         _print(printed.getvalue())
     except BrokenPipeError:  # as of `wive info ... | head -1`
         return BROKEN_PIPE
-    except KeyboardInterrupt:
-        print("wive: interrupted", file=sys.stderr)
+    except KeyboardInterrupt as kept:
+        print(f"wive: interrupted: {kept}" if str(kept) else "wive: interrupted", file=sys.stderr)
         return INTERRUPTED
     except (ImportError, MemoryError, OSError, TypeError, ValueError) as error:
         print(f"wive: error: {' '.join(str(error).split()) or 'out of memory'}", file=sys.stderr)
@@ -158,7 +159,8 @@ def _add_trace(subparsers: "argparse._SubParsersAction[_Parser]") -> None:
         "trace",
         help="closest hits of rays from a file, or all",
         description="Find the closest hit of each ray; write arrays t, prim and uv. With --all, find every "
-        "hit: those of ray i are rows offsets[i] to offsets[i+1], by ascending t.",
+        "hit: those of ray i are rows offsets[i] to offsets[i+1], by ascending t. Rays are read, traced and "
+        "written a piece at a time, so there may be more than fit into memory.",
         formatter_class=_Defaults,
     )
     parser.add_argument("mesh", metavar="MESH", help="mesh file or saved scene")
@@ -166,15 +168,41 @@ def _add_trace(subparsers: "argparse._SubParsersAction[_Parser]") -> None:
         "rays",
         metavar="RAYS",
         help=".npy of shape (n,6): origin, direction; or (n,8): with tmin, tmax; "
-        "or .npz of origins, directions and maybe tmin, tmax",
+        "or .npz of origins, directions and maybe tmin, tmax; or a raw file, see --raw",
     )
-    parser.add_argument("-o", "--output", required=True, metavar="NPZ", help="hits to write")
+    parser.add_argument(
+        "-o",
+        "--output",
+        required=True,
+        metavar="HITS",
+        help="hits to write: an .npz file, or a name that ends in / for a folder of .npy files",
+    )
+    parser.add_argument(
+        "--resume",
+        action="store_true",
+        help="go on with a run that was interrupted or killed, if there is one",
+    )
+    parser.add_argument(
+        "--raw", metavar="DTYPE", help="RAYS holds numbers of this dtype alone, such as float32 or >f8"
+    )
+    parser.add_argument(
+        "--columns",
+        metavar="NAMES",
+        help="with --raw: what the numbers of a ray are, _ for others; default: ox,oy,oz,dx,dy,dz, and there "
+        "may be tmin,tmax",
+    )
+    parser.add_argument(
+        "--piece",
+        type=int,
+        metavar="RAYS",
+        help=f"rays per piece; default: {PIECE:,}, with --all {PIECE_ALL:,}",
+    )
     parser.add_argument("--all", action="store_true", help="every hit of each ray; also writes offsets")
     parser.add_argument(
         "--max-bytes",
         type=int,
         metavar="BYTES",
-        help=f"with --all: what the hits of {commands.BATCH_RAYS:,} rays may take; "
+        help="with --all: what the hits of a piece may take; "
         "default: three quarters of the memory that is available",
     )
     parser.add_argument(

@@ -11,6 +11,7 @@ from wive._internal.files import PathLike, file_name
 from wive._internal.lines import one_line
 from wive._internal.npzfile import check_input
 from wive._internal.precision import real_asked
+from wive._internal.progress import ProgressOption, checked_progress
 from wive._internal.several_meshes import Joined
 from wive._internal.storage import Options, is_saved_scene, read_scene
 from wive._internal.stored_scenes import Place, is_stored_file, open_file, source_of
@@ -18,7 +19,13 @@ from wive.backend import resolve_backend
 from wive.scene import Scene, tracer_of
 
 
-def load(path: PathLike, *, backend: str | None = None, device: str | None = None) -> Scene:
+def load(
+    path: PathLike,
+    *,
+    backend: str | None = None,
+    device: str | None = None,
+    progress: ProgressOption = None,
+) -> Scene:
     """The scene in a file that `Scene.save` wrote, with the options it was made with.
 
     The file is mapped read-only, and shared by all processes that load it, which takes milliseconds whatever
@@ -27,13 +34,14 @@ def load(path: PathLike, *, backend: str | None = None, device: str | None = Non
     of wive 0.1) are read, and the tree is built.
 
     `backend` or `device`, if given, replaces both saved ones: a scene saved with "avx512" or on "cuda:0"
-    opens with backend "auto" on a machine that lacks these.
+    opens with backend "auto" on a machine that lacks these. `progress` is that of `Scene`, if a tree is
+    built.
 
     Raises OSError if the file can't be read, ValueError if it is not a saved scene, is damaged, cut short or
     of a newer wive, or if its backend or device can't be used here. What only verifying finds is a
     ValueError of the first query, which names the file.
     """
-    return _loaded(Scene, path, backend, device)
+    return _loaded(Scene, path, backend, device, checked_progress(progress))
 
 
 def is_saved_file(path: PathLike) -> bool:
@@ -47,7 +55,8 @@ def is_saved_file(path: PathLike) -> bool:
 
 def from_saved(cls: type[Scene], path: PathLike, dtype: DTypeLike | None, given: dict[str, Any]) -> Scene:
     """The saved scene, or one over its mesh if options are given that its tree doesn't have."""
-    saved = _loaded(cls, path, given.get("backend"), given.get("device"))
+    progress = checked_progress(given.pop("progress", None))
+    saved = _loaded(cls, path, given.get("backend"), given.get("device"), progress)
     has: dict[str, Any] = {
         "accuracy": saved.accuracy,
         "nodes": saved.nodes,
@@ -59,7 +68,7 @@ def from_saved(cls: type[Scene], path: PathLike, dtype: DTypeLike | None, given:
         return saved
     saved._bvh.verify()
     mesh = Joined(saved.vertices, saved.faces, saved._tracer.geoms)
-    return cls(mesh, **{**saved._options, "dtype": dtype, **given})
+    return cls(mesh, **{**saved._options, "dtype": dtype, **given}, progress=progress)
 
 
 def reopened(place: tuple[Any, ...], backend: str, device: str | None) -> Scene:
@@ -68,14 +77,17 @@ def reopened(place: tuple[Any, ...], backend: str, device: str | None) -> Scene:
     return _of_tree(Scene, found.open(), one_line(found.name), {"backend": backend, "device": device})
 
 
-def _loaded(cls: type[Scene], path: PathLike, backend: str | None, device: str | None) -> Scene:
+def _loaded(
+    cls: type[Scene], path: PathLike, backend: str | None, device: str | None, progress: ProgressOption
+) -> Scene:
     replaced = {} if backend is None and device is None else {"backend": backend or "auto", "device": device}
     name = one_line(file_name(path))
     if is_stored_file(path):
         return _of_tree(cls, open_file(path), name, replaced)
     vertices, faces, geoms, options = read_scene(path)
+    chosen = cast(dict[str, Any], {**options, **replaced})
     try:
-        return cls(Joined(vertices, faces, geoms), **cast(dict[str, Any], {**options, **replaced}))
+        return cls(Joined(vertices, faces, geoms), **chosen, progress=progress)
     except (TypeError, ValueError) as error:
         raise ValueError(f"{name}: {error}") from error
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -18,7 +18,7 @@ from wive._internal.pictures.image_files import write_png as write_png
 from wive._internal.pictures.shades import AmbientOcclusion, Headlight, NormalColours, render_depth
 from wive._internal.pictures.surroundings import Sight, reaches_sky, stands_inside
 from wive._internal.pictures.viewpoint import default_camera
-from wive._internal.progress import progress_bar
+from wive._internal.progress import ProgressOption, checked_progress, part, reported
 from wive.camera import Camera, unit_vector
 from wive.scene import Scene
 from wive.sensors import PinholeCamera
@@ -48,7 +48,7 @@ def render(
     albedo: Colours = None,
     seed: int = 0,
     threads: int | None = None,
-    progress: bool = False,
+    progress: ProgressOption = None,
     **how: Unpack[How],
 ) -> Image:
     """A picture of the scene.
@@ -69,7 +69,8 @@ def render(
         seed: another seed gives another picture of the same noise level. Random numbers come from (seed,
             pixel, sample, bounce) alone, so the picture depends on neither `threads` nor the scene's backend.
         threads: how many to use; None is every core. For CPU backends.
-        progress: show a progress bar (needs tqdm).
+        progress: True shows a progress bar, if there is tqdm; or a callable of (done, total) in rows, as for
+            `Scene`.
         bounces: 8 unless given: diffuse bounces after which a path ends.
         sky: "day" unless given, blue with a sun; "cloudy"; "white", of radiance 1 everywhere; "black". For
             "path".
@@ -96,7 +97,7 @@ def render(
         threads=threads,
         **how,
     )
-    return render_counted(scene, camera, settings, progress=arguments.flag("progress", progress)).image
+    return render_counted(scene, camera, settings, progress=checked_progress(progress)).image
 
 
 def settings_of(**given: Any) -> Settings:
@@ -116,7 +117,7 @@ class Picture(NamedTuple):
 
 
 def render_counted(
-    scene: Scene, camera: Perspective | None, settings: Settings, *, progress: bool
+    scene: Scene, camera: Perspective | None, settings: Settings, *, progress: ProgressOption
 ) -> Picture:
     """The picture that `render` returns."""
     if not isinstance(scene, Scene):
@@ -126,8 +127,13 @@ def render_counted(
         _cpu.expect_memory(settings.height * settings.width * 3 * np.dtype(np.float32).itemsize)
         plan = planned(scene, camera, settings)
         image = np.zeros(plan.shape, np.float32)
-        with progress_bar(settings.height, "row", "rendering", show=progress) as advance:
-            rays = render_rows(scene, plan, image, 0, settings.height, advance)
+        rays = reported(
+            progress,
+            settings.height,
+            "row",
+            "rendering",
+            lambda: render_rows(scene, plan, image, 0, settings.height),
+        )
         if plan.shading in EXPOSABLE:
             expose(image, exposure_factor(image[:, :, 1], settings.exposure))
         return Picture(image, plan.shading, rays)
@@ -175,15 +181,13 @@ def planned(scene: Scene, camera: Perspective | None, settings: Settings) -> Pla
     return Plan(settings, camera, albedo, shading, reach)
 
 
-def render_rows(
-    scene: Scene, plan: Plan, image: Image, begin: int, end: int, advance: Callable[[int], object]
-) -> int:
+def render_rows(scene: Scene, plan: Plan, image: Image, begin: int, end: int) -> int:
     """Render rows [begin, end) into the image of the whole picture; returns how many rays were traced."""
     frame, settings = plan.frame, plan.settings
     if plan.shading == "path":
         look = _look(settings, plan.albedo, frame, plan.camera)
-        return _trace_paths(scene, frame.astype(np.float32), image, look, begin, end, advance)
-    return _shade(scene, plan, image, begin, end, advance)
+        return _trace_paths(scene, frame.astype(np.float32), image, look, begin, end)
+    return _shade(scene, plan, image, begin, end)
 
 
 def _resolved(scene: Scene, frame: NDArray[np.float64], settings: Settings) -> tuple[str, float]:
@@ -200,13 +204,11 @@ def _resolved(scene: Scene, frame: NDArray[np.float64], settings: Settings) -> t
     return shading, reach
 
 
-def _shade(
-    scene: Scene, plan: Plan, image: Image, begin: int, end: int, advance: Callable[[int], object]
-) -> int:
+def _shade(scene: Scene, plan: Plan, image: Image, begin: int, end: int) -> int:
     """Render by the scene's queries."""
     frame, spp, threads = plan.frame, plan.settings.spp, plan.settings.threads
     if plan.shading == "depth":
-        return render_depth(image, frame, scene, threads, begin, end, advance)
+        return render_depth(image, frame, scene, threads, begin, end)
     kinds = {"normals": NormalColours, "headlight": Headlight}
     seed = plan.settings.seed
     shader = (
@@ -214,7 +216,7 @@ def _shade(
         if plan.shading == "ao"
         else kinds[plan.shading](scene, plan.albedo, seed, threads)
     )
-    return shader.render(image, frame, spp, begin, end, advance)
+    return shader.render(image, frame, spp, begin, end)
 
 
 def _look(settings: Settings, albedo: Albedo, frame: NDArray[np.float64], camera: Perspective) -> Look:
@@ -225,20 +227,12 @@ def _look(settings: Settings, albedo: Albedo, frame: NDArray[np.float64], camera
     return Look(settings.spp, settings.bounces, kind, albedo.colours, light, settings.seed, threads)
 
 
-def _trace_paths(
-    scene: Scene,
-    frame: Image,
-    image: Image,
-    look: Look,
-    begin: int,
-    end: int,
-    advance: Callable[[int], object],
-) -> int:
+def _trace_paths(scene: Scene, frame: Image, image: Image, look: Look, begin: int, end: int) -> int:
     trace = scene._tracer.rows_renderer(frame, image, look)
     rays = 0
     for first, last in _bands(begin, end, image.shape[1] * look.spp, scene.device):
-        rays += trace(first, last)
-        advance(last - first)
+        with part((first - begin) / (end - begin), (last - begin) / (end - begin)):
+            rays += trace(first, last)
     return rays
 
 

@@ -38,6 +38,7 @@ ProjectedAreaPrefixSum::ProjectedAreaPrefixSum(const BinaryTree& tree, Threads& 
             chunks_before_[chunk] = static_cast<double>(sum);
         }
     };
+    const ProgressPart uncounted(0, 0);  // of emitting the tree
     parallel_chunks_scattered(chunks_before_.size(), chunks_per_task, threads, sum_chunks);
     double sum = 0;
     for (double& chunk : chunks_before_) {

@@ -9,6 +9,7 @@
 #include "build/binned_split.h"
 #include "build/collapse.h"
 #include "core/parallel.h"
+#include "core/progress.h"
 
 namespace wive {
 namespace {
@@ -48,8 +49,17 @@ public:
 
     void build(const Box& centroids) {
         items_.push_back({{tree_.root(), 0, tree_.box, centroids}, false});
+        // About how often a reference moves: once per level of the tree, down to the blocks.
+        const double levels = std::bit_width(blocks_for(tree_.count)),
+                     moves = levels * static_cast<double>(tree_.count);
+        const double top = std::max(0.0, levels - std::bit_width(blocks_for(parallel_range))) / levels;
+        double moved = 0;
         for (std::size_t i = 0; i < items_.size(); ++i) {
-            if (items_[i].range.tree.size() <= parallel_range) continue;
+            const std::uint32_t size = items_[i].range.tree.size();
+            if (size <= parallel_range) continue;
+            const double before = std::min(top, moved / moves);
+            const ProgressPart split(before, before);
+            moved += size;
             const bool from_scratch = items_[i].in_scratch;
             const Halves halves = split_parallel(items_[i].range, from_scratch);
             items_[i].left = items_.size();
@@ -57,8 +67,12 @@ public:
             items_.push_back({halves.left, !from_scratch});
             items_.push_back({halves.right, !from_scratch});
         }
-        while (split_items()) {
+        {
+            const ProgressPart splits(top, top);
+            while (split_items()) {
+            }
         }
+        const ProgressPart rest(top, 1);
         std::vector<std::size_t> tasks = leaf_items(0);
         std::sort(tasks.begin(), tasks.end(), [&](std::size_t a, std::size_t b) {
             return items_[a].range.tree.size() > items_[b].range.tree.size();

@@ -15,6 +15,7 @@
 #include "build/write_node.h"
 #include "core/ensure.h"
 #include "core/parallel.h"
+#include "core/progress.h"
 
 namespace wive {
 
@@ -69,7 +70,11 @@ public:
         std::vector<Part> subtrees;
         Size top = {1, 0};
         plan_top(root, 1, top, subtrees);
-        parallel_for(subtrees.size(), threads, [&](std::size_t i) { subtrees[i].size = size_of(subtrees[i].slot); });
+        {
+            const ProgressPart measuring(0, 0);
+            parallel_for(subtrees.size(), threads,
+                         [&](std::size_t i) { subtrees[i].size = size_of(subtrees[i].slot); });
+        }
         Size& total = total_ = top;
         for (Part& subtree : subtrees) {
             subtree.first = total;

@@ -15,6 +15,7 @@
 #include "core/layout.h"
 #include "core/parallel.h"
 #include "core/planes.h"
+#include "core/progress.h"
 #include "core/vec3.h"
 
 namespace wive {
@@ -138,6 +139,7 @@ bool has_area(Float4v a, Float4v b, Float4v c) {
 
 MeshCopy::MeshCopy(const Mesh<float>& mesh, Threads& threads)
     : vertices_(3 * mesh.vertex_count), faces_(3 * mesh.face_count) {
+    const ProgressPart uncounted(0, 0);  // of building, of which it is little
     const auto copy = [&threads](const auto* from, auto& to) {
         parallel_chunks_scattered(to.size(), 3 * chunk_size, threads, [&](std::size_t begin, std::size_t end) {
             std::copy(from + begin, from + end, to.data() + begin);

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cstring>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -9,9 +10,13 @@
 #include "build/refit_leaf.h"
 #include "build/write_node.h"
 #include "core/parallel.h"
+#include "core/progress.h"
 
 namespace wive {
 namespace {
+
+// Where the fitting of boxes begins and ends, in fractions of the time of a refit, by measurement.
+constexpr double fit_begin = 0.05, fit_end = 0.8;
 
 constexpr std::size_t task_count = 256;  // about as many subtrees are fitted in parallel
 constexpr std::size_t chunk_size = 1 << 12;
@@ -123,6 +128,7 @@ template <class Real>
 std::unique_ptr<Bvh> Bvh::refitted(const Mesh<Real>& mesh, unsigned requested_threads) const {
     if (facts_.form != NodeForm::float32) return nullptr;
     Threads threads(thread_count(requested_threads));
+    std::optional<ProgressPart> part(std::in_place, 0.0, fit_begin);
     check_mesh(mesh, threads);
     if (facts_.triangle_count < mesh.face_count && is_any_missing(blocks_of<Real>(*this), mesh, threads))
         return nullptr;
@@ -137,7 +143,9 @@ std::unique_ptr<Bvh> Bvh::refitted(const Mesh<Real>& mesh, unsigned requested_th
     const BvhView from = view();
     if constexpr (precision_of<Real> == Precision::float64) bvh->set_bounds(find_bounds(mesh, threads));
     BoxFitter<Real> fitter(from, facts_.node_count, units, mesh, bvh->facts_.center, facts_.accuracy);
+    part.emplace(fit_begin, fit_end);
     fitter.fit(threads);
+    part.emplace(fit_end, 1);
     bvh->facts_.triangle_count = facts_.triangle_count - fitter.lost_count();
     const Point remaining_center = bvh->finish_bounds(fitter.all());
     const Node* old_nodes = reinterpret_cast<const Node*>(units_.data());

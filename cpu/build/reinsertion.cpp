@@ -10,6 +10,7 @@
 
 #include "build/collapse.h"
 #include "core/parallel.h"
+#include "core/progress.h"
 
 namespace wive {
 namespace {
@@ -72,7 +73,9 @@ public:
     }
 
     void optimize(Threads& threads) {
-        for (int i = 0; i < rounds && improve(threads); ++i) {
+        for (int i = 0; i < rounds; ++i) {
+            const ProgressPart round(static_cast<double>(i) / rounds, static_cast<double>(i + 1) / rounds);
+            if (!improve(threads)) return;
         }
     }
 

@@ -16,6 +16,7 @@
 #include "core/default_floats.h"
 #include "core/memory.h"
 #include "core/poll.h"
+#include "core/progress.h"
 #include "core/thread_count.h"
 
 namespace wive {
@@ -51,6 +52,7 @@ public:
     template <class Work>
     void for_each(std::size_t count, const Work& work) {
         Job job = {count, [](const void* w, std::size_t i) { (*static_cast<const Work*>(w))(i); }, &work};
+        const ProgressPart loop = ProgressPart::of_loop(&job.next, count);
         const std::size_t wanted = std::min<std::size_t>(count_, count);
         if (wanted > 1) start(job, wanted - 1);
         job.run();
@@ -63,17 +65,17 @@ private:
         std::size_t count;
         void (*call)(const void* work, std::size_t i);
         const void* work;
-        std::atomic<std::size_t> next{0};
+        std::size_t next = 0;  // shared by the threads
         std::atomic<bool> failed{false};
         std::exception_ptr failure{};
 
         void run() {
             try {
-                for (std::size_t i; (i = next.fetch_add(1, std::memory_order_relaxed)) < count; poll_caller())
+                for (std::size_t i; (i = __atomic_fetch_add(&next, 1, __ATOMIC_RELAXED)) < count; poll_caller())
                     call(work, i);
             } catch (...) {
                 if (!failed.exchange(true)) failure = std::current_exception();
-                next.store(count, std::memory_order_relaxed);
+                __atomic_store_n(&next, count, __ATOMIC_RELAXED);
             }
         }
     };

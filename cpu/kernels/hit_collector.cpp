@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <numeric>
+#include <optional>
 
 #include "core/parallel.h"
+#include "core/progress.h"
 
 namespace wive {
 namespace {
@@ -72,6 +74,7 @@ void HitCollector<Real>::write_offsets(std::int64_t* offsets) const {
 template <class Real>
 void HitCollector<Real>::sort_into(const SortedHits<Real>& hits) {
     Threads threads(threads_);
+    std::optional<ProgressPart> part(std::in_place, 0.0, 0.5);
     // One worker traces a ray, so the ray's hits are in one list and its count has one writer.
     parallel_for(lists_.size(), threads, [&](std::size_t i) {
         lists_[i].drain([&](const FoundHit<Real>& hit) {
@@ -82,6 +85,7 @@ void HitCollector<Real>::sort_into(const SortedHits<Real>& hits) {
             hits.uv[2 * row + 1] = hit.v;
         });
     });
+    part.emplace(0.5, 1);
     parallel_chunks(counts_.size(), rays_per_sort, threads, [&](std::size_t begin, std::size_t end) {
         std::vector<Hit<Real>> scratch;
         for (std::size_t i = begin; i < end; ++i) {

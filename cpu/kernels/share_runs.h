@@ -22,6 +22,7 @@ void share_runs(std::size_t count, std::size_t run, unsigned workers, const Work
     std::size_t next = 0;
     const RaySource source = {&next, count, run};
     parallel_for(workers, workers, [&](std::size_t worker) {
+        const ProgressPart loop = ProgressPart::of_loop(&next, count);
         try {
             work(worker, source);
         } catch (...) {

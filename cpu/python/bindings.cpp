@@ -6,6 +6,7 @@
 
 #include "core/memory.h"
 #include "core/parallel.h"
+#include "core/progress.h"
 #include "exact_source.h"
 #include "kernels/avx512_form.h"
 #include "python/bindings.h"
@@ -157,14 +158,45 @@ py::array_t<float> copy(const std::array<float, n>& values) {
 
 unsigned long signal_thread = 0;
 
-}  // namespace
-
+// Whether this is the thread in which Python handles signals.
 bool handles_signals() { return PyThread_get_thread_ident() == signal_thread; }
 
-void check_signals() {
+// The function that hears how far the work of this thread is; null if there is none.
+thread_local const py::function* hearer = nullptr;
+
+// Sets it, and what was there before again in the end.
+class Hearer {
+public:
+    explicit Hearer(const py::function* function) : before_(hearer) { hearer = function; }
+    ~Hearer() { hearer = before_; }
+    Hearer(const Hearer&) = delete;
+    Hearer& operator=(const Hearer&) = delete;
+
+    const py::function* before() const { return before_; }
+
+private:
+    const py::function* const before_;
+};
+
+void check_caller() {
     const py::gil_scoped_acquire lock;
-    if (PyErr_CheckSignals() != 0) throw py::error_already_set();
+    const double done = progress();
+    const OtherWork called;
+    const Hearer nobody(nullptr);
+    if (handles_signals() && PyErr_CheckSignals() != 0) throw py::error_already_set();
+    if (const py::function* hears = nobody.before()) (*hears)(done);
 }
+
+// Calls `work`. Meanwhile `hears` is called with the fraction that is done of the core's call at hand, ten times a
+// second at most.
+py::object report_to(const py::function& hears, const py::function& work) {
+    const Hearer scope(&hears);
+    return work();
+}
+
+}  // namespace
+
+Poll::Check caller_check() { return hearer || handles_signals() ? &check_caller : nullptr; }
 
 }  // namespace wive
 
@@ -188,6 +220,7 @@ PYBIND11_MODULE(_cpu, m, pybind11::mod_gil_not_used()) {
     m.def("usable_cores", &usable_cores, py::arg("root") = "");
     m.def("thread_count", &thread_count, py::arg("requested") = 0);
     m.def("set_thread_count", &set_thread_count, py::arg("count"));
+    m.def("report_to", &report_to, py::arg("hears"), py::arg("work"));
     m.def("expect_memory", &expect_memory, py::arg("bytes"));
     m.attr("compiler") = compiler_name;
     m.attr("exact_source") = exact_source;

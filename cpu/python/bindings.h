@@ -62,17 +62,15 @@ void expect_shape(const Array<T>& array, py::ssize_t columns, const char* messag
     expect(array.ndim() == 2 && array.shape(1) == columns, message);
 }
 
-// Throws Python's exception if a signal's handler raised one: KeyboardInterrupt, usually.
-void check_signals();
-
-// Whether this is the thread in which Python handles signals.
-bool handles_signals();
+// What work asks on this thread: it throws Python's exception if a signal's handler raised one, KeyboardInterrupt
+// usually, or the function did that hears of progress. Null if this thread handles no signals and nobody hears.
+Poll::Check caller_check();
 
 // Releases the interpreter lock, and computes in the core's own floating-point environment meanwhile. Ctrl-C ends the
 // work, if it is shared out by Threads.
 struct Released {
     py::gil_scoped_release release;
-    Poll poll{handles_signals() ? &check_signals : nullptr};
+    Poll poll{caller_check()};
     DefaultFloats floats;
 };
 

@@ -2,12 +2,16 @@
 #include <optional>
 
 #include "core/memory.h"
+#include "core/progress.h"
 #include "kernels/hit_collector.h"
 #include "kernels/trace.h"
 #include "python/bindings.h"
 
 namespace wive {
 namespace {
+
+// Where the sorting of all hits begins, in fractions of the query's time, about.
+constexpr double sort_begin = 0.8;
 
 // A view of the caller's arrays, whose shapes it checks.
 template <class Real>
@@ -120,6 +124,7 @@ py::tuple intersect_all(const QueryCall<Real>& call) {
     std::optional<HitCollector<Real>> collector;
     {
         const Released released;
+        const ProgressPart tracing(0, sort_begin);
         collector.emplace(call.kernels, kernel, bvh, call.rays, call.size(), !call.touching, steps_data, call.threads,
                           call.in_flight, call.max_bytes);
         collector->write_offsets(offsets_data);
@@ -130,6 +135,7 @@ py::tuple intersect_all(const QueryCall<Real>& call) {
     const SortedHits<Real> hits = {offsets_data, t.mutable_data(), prim.mutable_data(), uv.mutable_data()};
     {
         const Released released;
+        const ProgressPart sorting(sort_begin, 1);
         collector->sort_into(hits);
         collector.reset();  // here, because long lists take a while to free
     }

@@ -8,6 +8,7 @@
 #include "build/verify.h"
 #include "core/checksum.h"
 #include "core/parallel.h"
+#include "core/progress.h"
 #include "python/bindings.h"
 
 namespace wive {
@@ -66,6 +67,7 @@ Checksums PyBvh::checksums() const {
 void PyBvh::verify() const {
     if (!stored_) return;
     const Stored& stored = *stored_;
+    const ProgressPart uncounted(0, 0);  // of the query that comes first
     const Checksums found = checksums();
     const auto expect_good = [&](bool good, const std::string& fault) {
         if (!good) throw std::invalid_argument(stored.name + ": is damaged (" + fault + ")");
@@ -98,6 +100,15 @@ void bind_stored(py::module_& m, PyBvhClass& bvh) {
         .def_property_readonly("source", &PyBvh::source)
         .def("checksums", &PyBvh::checksums)
         .def("verify", [](const PyBvh& self) { self.bvh(); });
+    m.def(
+        "checksum",
+        [](const Array<std::uint8_t>& data, unsigned threads) {
+            const std::span<const std::byte> bytes = bytes_of(data);
+            const Released released;
+            Threads own(thread_count(threads));
+            return checksum(bytes, own);
+        },
+        array_arg("data"), py::arg("threads") = 0);
 }
 
 }  // namespace wive

@@ -13,8 +13,8 @@ from support.meshes import sphere
 from support.rooms import room
 
 import wive
-from wive._internal import cpu_tracer
-from wive._internal.progress import progress_bar
+from wive._internal import cpu_tracer, progress
+from wive._internal.progress import progress_of
 
 
 def picture_of(html: str) -> np.ndarray:
@@ -86,6 +86,8 @@ def test_the_bar_is_the_notebooks_own_in_a_notebook(monkeypatch):
     seen = []
 
     class Bar:
+        n = 0
+
         def __init__(self, **options):
             seen.append(options)
 
@@ -96,15 +98,17 @@ def test_the_bar_is_the_notebooks_own_in_a_notebook(monkeypatch):
             seen.append("closed")
 
         def update(self, units):
+            self.n += units
             seen.append(units)
 
     tqdm, auto = types.ModuleType("tqdm"), types.ModuleType("tqdm.auto")
     auto.tqdm = Bar
     monkeypatch.setitem(sys.modules, "tqdm", tqdm)
     monkeypatch.setitem(sys.modules, "tqdm.auto", auto)
-    with progress_bar(10, "row", "rendering") as advance:
-        advance(4)
-    assert seen[0]["total"] == 10 and seen[1:] == [4, "closed"]
+    monkeypatch.setattr(progress, "PERIOD", 0)
+    with progress_of(True, 10, "row", "rendering") as asked:
+        asked.at(0.4)
+    assert seen[0]["total"] == 10 and seen[1:] == [4, 6, "closed"]
 
 
 @pytest.mark.parametrize("shading", ["path", "ao", "headlight", "normals", "depth"])

@@ -13,7 +13,6 @@ from support.gltf_files import compressed
 from support.meshes import random_rays, sphere
 
 import wive
-from wive._internal import commands
 from wive.cli import main
 
 NO_RAYS = "not a file of rays, (n,6) or (n,8) in an .npy or `origins` and `directions` in an .npz: "
@@ -77,8 +76,7 @@ def test_render_takes_a_camera(ball, tmp_path):
 
 
 @pytest.mark.parametrize("form", ["six", "eight", "npz"])
-def test_trace_writes_the_hits_of_the_library(ball, tmp_path, capsys, monkeypatch, form):
-    monkeypatch.setattr(commands, "BATCH_RAYS", 100)
+def test_trace_writes_the_hits_of_the_library(ball, tmp_path, capsys, form):
     origins, directions = random_rays(1003, seed=1)
     limits = (
         () if form == "six" else (np.full(1003, 0.1, np.float32), np.linspace(0, 3, 1003, dtype=np.float32))
@@ -89,7 +87,7 @@ def test_trace_writes_the_hits_of_the_library(ball, tmp_path, capsys, monkeypatc
     else:
         rays = tmp_path / "rays.npy"
         np.save(rays, np.column_stack([origins, directions, *limits]))
-    assert run("trace", ball, rays, "-o", tmp_path / "hits.npz", "--threads", 2) == 0
+    assert run("trace", ball, rays, "-o", tmp_path / "hits.npz", "--threads", 2, "--piece", 100) == 0
     expected = wive.Scene.from_file(ball).intersect(origins, directions, *limits)
     assert "1,003 rays in" in capsys.readouterr().out
     with np.load(tmp_path / "hits.npz") as hits:

@@ -5,19 +5,17 @@ import pytest
 from support.meshes import random_rays, soup
 
 import wive
-from wive._internal import commands
 from wive.cli import main
 
 
 @pytest.mark.parametrize("count", [1003, 0])
-def test_trace_all_writes_the_hits_of_the_library(tmp_path, capsys, monkeypatch, count):
-    monkeypatch.setattr(commands, "BATCH_RAYS", 100)
+def test_trace_all_writes_the_hits_of_the_library(tmp_path, capsys, count):
     vertices, faces = soup(200, seed=1)
     np.savez(tmp_path / "soup.npz", vertices=vertices, faces=faces)
     origins, directions = random_rays(count, seed=2, low=-0.5, high=1.5)
     np.save(tmp_path / "rays.npy", np.column_stack([origins, directions]))
     files = [str(tmp_path / name) for name in ("soup.npz", "rays.npy", "hits.npz")]
-    assert main(["trace", "--all", *files[:2], "-o", files[2]]) == 0
+    assert main(["trace", "--all", "--piece", "100", *files[:2], "-o", files[2]]) == 0
     expected = wive.Scene(vertices, faces).intersect_all(origins, directions)
     assert f"{count:,} rays in" in (said := capsys.readouterr().out)
     assert f", {len(expected.t):,} hits, " in said

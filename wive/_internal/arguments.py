@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from wive._internal.precision import FLOAT32, Floats, Real, real_asked, real_of
+from wive._internal.progress import ProgressOption
 from wive._internal.room import expect_room
 from wive._internal.scalars import MOST_COUNT, shown, unreadable
 from wive._internal.scalars import choice as choice
@@ -39,6 +40,7 @@ class QueryOptions(TypedDict, total=False):
     threads: int | None
     in_flight: int | None
     lanes: LanesOption
+    progress: ProgressOption
 
 
 class Plain(QueryOptions, total=False):

@@ -1,38 +1,28 @@
 """The commands of the command line, given their parsed options."""
 
+import sys
 import time
 from argparse import Namespace
-from collections.abc import Callable
 from dataclasses import fields, replace
-from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from wive._internal.arguments import max_bytes as checked_max_bytes
-from wive._internal.arguments import rays as checked_rays
-from wive._internal.arguments import refuse_lacking
-from wive._internal.arguments import threads as checked_threads
-from wive._internal.files import atomic_write, check_output
-from wive._internal.npz_writer import write_npz
-from wive._internal.npzfile import Npz, check_input, open_npy_or_npz
+from wive._internal.npzfile import check_input
 from wive._internal.picture import Settings
 from wive._internal.pictures.image_files import check_picture_output, write_picture
 from wive._internal.pictures.viewpoint import default_camera
-from wive._internal.precision import FLOAT64, Floats, Real, real_named
-from wive._internal.progress import progress_bar
 from wive._internal.terrain import terrain_camera, terrain_colours, terrain_mesh
 from wive._internal.textures import refuse_part
-from wive.all_hits import AllHits
 from wive.backend import Backend, backends
 from wive.camera import Camera
 from wive.colors import load_colors
-from wive.hits import Hits
 from wive.loading import is_saved_file
 from wive.meshfile import load_mesh
 from wive.rendering import render_counted
 from wive.scene import Scene
+from wive.streams import check_hits_output, trace
 
 # Sine of an angle: a nearer `up` is along the view.
 ALONG_VIEW = 1e-6
@@ -46,8 +36,6 @@ USUAL_UPS = {
 }
 # Shadings that show no colours of surfaces.
 COLOURLESS = "normals", "depth"
-# Rays per step of the progress bar.
-BATCH_RAYS = 500_000
 
 
 def render_picture(options: Namespace) -> None:
@@ -66,7 +54,7 @@ def render_picture(options: Namespace) -> None:
         settings = replace(settings, albedo=albedo)
     camera = _camera(options, scene)
     begin = time.perf_counter()
-    picture = render_counted(scene, camera, settings, progress=True)
+    picture = render_counted(scene, camera, settings, progress=_shows_bars())
     seconds = time.perf_counter() - begin
     write_picture(output, picture.image, srgb=picture.shading != "normals")
     how = f"{_rate(picture.rays, seconds)}, {_tracer(scene)}, {len(scene):,} triangles"
@@ -74,47 +62,35 @@ def render_picture(options: Namespace) -> None:
 
 
 def trace_rays(options: Namespace) -> None:
-    """`wive trace`: write the closest hits, or all, of a file of rays to an npz file."""
-    output = check_output(options.output, ".npz", [options.mesh, options.rays])
+    """`wive trace`: write the closest hits, or all, of a file of rays."""
+    output = check_hits_output(options.output, [options.mesh, options.rays])
     check_input(options.rays)
     refuse_part(check_input(options.mesh), output)
-    scene, _ = _scene_of(options, options.mesh)
-    refuse_lacking(scene.backend, scene._tracer.lacks, {"threads": options.threads})
-    origins, directions, tmin, tmax = _read_rays(
-        options.rays, real_named(scene.precision), scene.accuracy == "exact"
-    )
-    count = len(origins)
     if not options.all and (options.touching or options.max_bytes is not None):
         option = "--touching" if options.touching else "max_bytes"
         raise ValueError(f"{option} is only for all hits: add --all, or leave it out")
-    checked_threads(options.threads)  # before there is a progress bar
-    checked_max_bytes(options.max_bytes)
-    query: Callable[..., Hits | AllHits] = scene.intersect
+    scene, _ = _scene_of(options, options.mesh)
+    how: dict[str, Any] = {} if options.threads is None else {"threads": options.threads}
     if options.all:
-        query = partial(scene.intersect_all, touching=options.touching, max_bytes=options.max_bytes)
-    found: list[Hits | AllHits] = []
-    begin = time.perf_counter()
-    with progress_bar(count, "ray", "tracing") as advance:
-        for first in range(0, max(count, 1), BATCH_RAYS):
-            batch = slice(first, first + BATCH_RAYS)
-            hits = query(
-                origins[batch],
-                directions[batch],
-                tmin[batch] if len(tmin) == count else tmin[0],
-                tmax[batch] if len(tmax) == count else tmax[0],
-                threads=options.threads,
-            )
-            found.append(hits)
-            advance(len(hits))
-    seconds = time.perf_counter() - begin
-    arrays = {name: [getattr(hits, name) for hits in found] for name in ("t", "prim", "uv")}
-    if options.all:
-        counts = [np.diff(hits.offsets) for hits in found if isinstance(hits, AllHits)]
-        arrays["offsets"] = [np.zeros(1, np.int64), np.cumsum(np.concatenate(counts))]
-    with atomic_write(output) as file:
-        write_npz(file, arrays)
-    number = sum(np.count_nonzero(prim >= 0) for prim in arrays["prim"])
-    print(f"{output}: {_rate(count, seconds)}, {number:,} hits, {_tracer(scene)}")
+        how |= {"touching": options.touching, "max_bytes": options.max_bytes}
+    traced = trace(
+        scene,
+        options.rays,
+        output,
+        query="intersect_all" if options.all else "intersect",
+        raw=options.raw,
+        columns=options.columns,
+        resume=options.resume,
+        piece=options.piece,
+        progress=_shows_bars(),
+        **how,
+    )
+    if traced.resumed == traced.rays > 0:
+        print(f"{output}: complete already, {traced.rays:,} rays, {traced.hits:,} hits")
+        return
+    resumed = f" after {traced.resumed:,} before" if traced.resumed else ""
+    rate = _rate(traced.rays - traced.resumed, traced.seconds)
+    print(f"{output}: {rate}{resumed}, {traced.hits:,} hits, {_tracer(scene)}")
 
 
 def describe_mesh(options: Namespace) -> None:
@@ -152,12 +128,17 @@ def list_backends(options: Namespace) -> None:
             print(f"  {device:<7} {_usable(found)}")
 
 
+def _shows_bars() -> bool:
+    """Whether there is somebody to watch progress."""
+    return sys.stderr is not None and sys.stderr.isatty()
+
+
 def _scene_of(options: Namespace, path: str) -> tuple[Scene, float]:
     """The scene of a mesh file or a saved scene, and the seconds that its tree took."""
     precision = getattr(options, "precision", None)
     if is_saved_file(path):
         begin = time.perf_counter()
-        scene = Scene.from_file(path, dtype=precision, **_given(options))
+        scene = Scene.from_file(path, dtype=precision, progress=_shows_bars(), **_given(options))
         scene._bvh.verify()
     else:
         mesh = load_mesh(path, precision or "float32")
@@ -167,7 +148,7 @@ def _scene_of(options: Namespace, path: str) -> tuple[Scene, float]:
 
 
 def _scene(options: Namespace, vertices: NDArray[Any], faces: NDArray[Any]) -> Scene:
-    return Scene(vertices, faces, **_given(options))
+    return Scene(vertices, faces, progress=_shows_bars(), **_given(options))
 
 
 def _given(options: Namespace) -> dict[str, Any]:
@@ -213,29 +194,6 @@ def _camera(options: Namespace, scene: Scene) -> Camera:
 def _usual_up(mesh: str) -> tuple[float, float, float] | None:
     """What is up in files of a format by convention; None if programs differ."""
     return next((up for ending, up in USUAL_UPS.items() if mesh.lower().endswith(ending)), None)
-
-
-def _read_rays(name: str, real: Real, exact: bool) -> tuple[Floats, ...]:
-    """Origins, directions, tmin and tmax, checked; for accuracy "exact" rounded to `real`'s dtype."""
-    expected = "a file of rays, (n,6) or (n,8) in an .npy or `origins` and `directions` in an .npz"
-    with open_npy_or_npz(name, expected) as loaded:
-        if isinstance(loaded, Npz):
-            if not {"origins", "directions"} <= loaded.keys():
-                raise ValueError(f"{name}: not {expected}: found arrays {loaded.listed()}")
-            limits = [loaded.get("tmin", 0.0), loaded.get("tmax", np.inf)]
-            columns = [loaded["origins"], loaded["directions"], *limits]
-        elif loaded.ndim != 2 or loaded.shape[1] not in (6, 8):
-            raise ValueError(f"{name}: not {expected}: found shape {loaded.shape}")
-        else:
-            limits = [loaded[:, 6], loaded[:, 7]] if loaded.shape[1] == 8 else [0.0, np.inf]
-            columns = [loaded[:, :3], loaded[:, 3:6], *limits]
-    try:
-        origins, directions, tmin, tmax = columns
-        if not exact and not np.asarray(origins).dtype == np.asarray(directions).dtype == np.float32:
-            real = FLOAT64  # a float32 scene brings rays from far away near before it rounds them
-        return checked_rays(origins, directions, tmin, tmax, real)
-    except (TypeError, ValueError) as error:
-        raise ValueError(f"{name}: {error}") from error
 
 
 def _rate(rays: int, seconds: float) -> str:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from wive import _cpu
 from wive._internal.precision import EXACT, FLOAT64, Floats, Real
+from wive._internal.progress import part
 from wive._internal.rays import Rays
 
 # From this many radii away, rounding moves a ray by less than 1e-4 radii. Nearer ones are left as they are.
@@ -85,9 +86,10 @@ def moved(rays: Rays, arrays: Traced, real: Real, ball: Ball, threads: int = 0) 
         return None
     origins, directions, *_ = rays.numpy(FLOAT64)
     exact = real is EXACT
-    brought = _cpu.bring_near(
-        origins, directions, *arrays, *ball, MOST_COORDINATE, kept=exact, threads=threads
-    )
+    with part(0, 0):  # little of the query
+        brought = _cpu.bring_near(
+            origins, directions, *arrays, *ball, MOST_COORDINATE, kept=exact, threads=threads
+        )
     if brought is None:
         return None
     near, low, high, steps = brought

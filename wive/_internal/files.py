@@ -79,17 +79,23 @@ def atomic_write(path: PathLike) -> Iterator[BinaryIO]:
         mode = 0o666 if replaced is None else 0o600
         with open(os.open(part, os.O_WRONLY | os.O_CREAT | os.O_EXCL, mode), "wb") as file:
             yield file
-            file.flush()
-            if replaced is not None:
-                _keep_owner_and_mode(file.fileno(), replaced)
-            os.fsync(file.fileno())  # some systems find out only here that the disk is full
-        os.replace(part, final)
+            put_in_place(file, part, final)
     except BaseException as error:
         with suppress(OSError):
             os.unlink(part)
         if isinstance(error, OSError):
             raise named_error(error, name) from error
         raise
+
+
+def put_in_place(file: BinaryIO, part: str, final: str) -> None:
+    """Rename the open file `part` to `final` once it is on the disk; keep mode and owner of a file there."""
+    file.flush()
+    replaced = _status(final)
+    if replaced is not None:
+        _keep_owner_and_mode(file.fileno(), replaced)
+    os.fsync(file.fileno())  # some systems find out only here that the disk is full
+    os.replace(part, final)
 
 
 def _status(name: str) -> os.stat_result | None:

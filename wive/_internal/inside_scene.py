@@ -12,6 +12,7 @@ from wive._internal.host_arrays import host_arrays
 from wive._internal.inside import Mask, contains, is_closed
 from wive._internal.points import Points
 from wive._internal.precision import Floats, real_of
+from wive._internal.progress import part
 from wive._internal.rays import rays_of_numpy
 from wive._internal.tracer import Tracer
 
@@ -45,8 +46,10 @@ def signed_distances(
 ) -> Floats:
     """(n,) distances of points in host memory, negative inside."""
     rows = points.on_host(real_of(tracer.bvh.vertices.dtype, tracer.bvh.accuracy))
-    distance = tracer.closest(rows, work).distance
-    inside = inside_of(tracer, faces, points, sign, work)
+    with part(0, 0.8):
+        distance = tracer.closest(rows, work).distance
+    with part(0.8, 1):
+        inside = inside_of(tracer, faces, points, sign, work)
     return np.negative(distance, out=distance, where=inside)
 
 

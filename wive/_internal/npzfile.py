@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import io
-import math
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import IO, Any
 
@@ -16,10 +14,7 @@ from numpy.typing import NDArray
 from wive._internal.archives import Archive
 from wive._internal.files import PathLike, file_name
 from wive._internal.lines import one_line
-
-# A header is some 100 bytes; NumPy refuses one over 10,000 of its own accord.
-MOST_HEADER = 1 << 15
-CHUNK = 1 << 20
+from wive._internal.npy_rows import MOST_HEADER, FileRows, Header, fill, npy_header
 
 
 class Npz(Mapping[str, NDArray[Any]]):
@@ -43,6 +38,14 @@ class Npz(Mapping[str, NDArray[Any]]):
             stream, size = self._archive.open(member)
             with stream:
                 return _array(stream, size)
+
+    def rows(self, key: str) -> FileRows:
+        """The array `key`, to be read a piece at a time."""
+        member = self._members[key]
+        return FileRows(
+            lambda: self._archive.open(member),
+            lambda: _refused(self._name, self._expected, f"array `{key:.40}`"),
+        )
 
     def __contains__(self, key: object) -> bool:
         """Whether there is such an array; it is not unpacked for that."""
@@ -70,19 +73,30 @@ def open_npz(path: PathLike, expected: str) -> Iterator[Npz]:
 
 
 @contextmanager
-def open_npy_or_npz(path: PathLike, expected: str) -> Iterator[NDArray[Any] | Npz]:
-    """The array of an npy file, or the arrays of an npz file while the block runs."""
+def open_npy_or_npz(path: PathLike, expected: str) -> Iterator[FileRows | Npz]:
+    """The rows of the array of an npy file, or the arrays of an npz file while the block runs."""
     name = check_input(path)
     with open(name, "rb") as file:
         magic = file.read(len(npy.MAGIC_PREFIX))
-        size = file.seek(0, os.SEEK_END)
         file.seek(0)
         if magic != npy.MAGIC_PREFIX:
             yield Npz(file, name, expected)
             return
-        with _refused(one_line(name), expected, "its array"):
-            array = _array(file, size)
-        yield array
+    rows = file_rows(name, expected)
+    try:
+        yield rows
+    finally:
+        rows.close()
+
+
+def file_rows(name: str, expected: str, header: Callable[[bytes, int], Header] | None = None) -> FileRows:
+    """The rows of the array of a file, whose `header` is that of npy if None."""
+
+    def opened() -> tuple[IO[bytes], int]:
+        stream = open(name, "rb", buffering=0)  # noqa: SIM115  # FileRows closes it
+        return stream, os.fstat(stream.fileno()).st_size
+
+    return FileRows(opened, lambda: _refused(one_line(name), expected, "its array"), header)
 
 
 def check_input(path: PathLike) -> str:
@@ -112,32 +126,10 @@ def _refused(name: str, expected: str, place: str) -> Iterator[None]:
 def _array(stream: IO[bytes], size: int) -> NDArray[Any]:
     """The array of an npy file of `size` bytes, in the memory order of the file."""
     head = stream.read(MOST_HEADER)
-    shape, fortran, dtype, start = _header(head)
-    if dtype.hasobject:
-        raise ValueError(f"holds Python objects (dtype {dtype}), expected numbers")
-    wanted = math.prod(shape) * dtype.itemsize
-    if any(side < 0 for side in shape) or dtype.itemsize == 0 or wanted != size - start:
-        raise ValueError(f"claims shape {shape} of {dtype}, holds {size - start} bytes")
+    shape, fortran, dtype, start = npy_header(head, size)
     array = np.empty(shape, dtype, order="F" if fortran else "C")
-    left = memoryview(array.reshape(-1, order="A").view(np.uint8))
-    left[: len(head) - start] = head[start:]
-    left = left[len(head) - start :]
-    while left:
-        count = stream.readinto(left[:CHUNK])  # type: ignore[attr-defined]  # of io.BufferedIOBase
-        if not count:
-            raise ValueError(f"cut off {len(left)} bytes before its end")
-        left = left[count:]
+    flat = array.reshape(-1, order="A").view(np.uint8)
+    flat[: len(head) - start] = np.frombuffer(head, np.uint8, offset=start)
+    fill(stream, flat[len(head) - start :])
     stream.read(1)  # zipfile compares the checksum at the end
     return array
-
-
-def _header(head: bytes) -> tuple[tuple[int, ...], bool, np.dtype[Any], int]:
-    """Shape, whether in Fortran order, dtype and length of an npy header."""
-    stream = io.BytesIO(head)
-    version = npy.read_magic(stream)
-    read = npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0
-    try:
-        shape, fortran, dtype = read(stream)
-    except MemoryError:  # Python's parser, of nested text; the header itself is short
-        raise ValueError("its header is nested too deep") from None
-    return shape, fortran, dtype, stream.tell()

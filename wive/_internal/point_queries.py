@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -10,6 +13,8 @@ from wive._internal.arguments import Work
 from wive._internal.inside_scene import SIGNS, SignOption
 from wive._internal.points import Points, check_points
 from wive._internal.precision import Floats
+from wive._internal.progress import ProgressOption, checked_progress, reported
+from wive._internal.shapes import shape_of
 from wive._internal.tracer import Tracer
 from wive.closest import Closest
 
@@ -20,7 +25,12 @@ class PointQueries:
     _tracer: Tracer
 
     def closest(
-        self, points: ArrayLike, max_distance: ArrayLike = np.inf, *, threads: int | None = None
+        self,
+        points: ArrayLike,
+        max_distance: ArrayLike = np.inf,
+        *,
+        threads: int | None = None,
+        progress: ProgressOption = None,
     ) -> Closest:
         """The closest point of the surface to each point, not farther away than max_distance.
 
@@ -31,6 +41,8 @@ class PointQueries:
             max_distance: a number, or one per point, (n,) or of the points' leading shape; a point at this
                 very distance counts. A small one saves time.
             threads: how many to use; None is every core. For CPU backends.
+            progress: True shows a bar, if there is tqdm; or a callable of (done, total) in points, as for
+                `Scene`.
 
         Of triangles at the same distance, as those that share the closest edge, the one with the lowest
         number is chosen. Results are the same bits on every backend, for every number of threads, however
@@ -45,15 +57,23 @@ class PointQueries:
         """
         tracer = self._tracer
         work = _work(tracer, threads)
-        return tracer.closest(check_points(points, max_distance, tracer.backend, tracer.device), work)
+        checked = check_points(points, max_distance, tracer.backend, tracer.device)
+        closest: Closest = _reported(progress, checked, lambda: tracer.closest(checked, work))
+        return closest
 
     def contains(
-        self, points: ArrayLike, *, sign: SignOption = "crossings", threads: int | None = None
+        self,
+        points: ArrayLike,
+        *,
+        sign: SignOption = "crossings",
+        threads: int | None = None,
+        progress: ProgressOption = None,
     ) -> NDArray[np.bool_]:
         """(n,) bool: whether each point is inside the mesh.
 
         Arguments:
             points: as for `closest`.
+            threads, progress: as for `closest`.
             sign: "crossings" for closed meshes: a point is inside if a ray from there crosses the surface an
                 odd number of times, which is decided without error at edges and vertices, too; where meshes
                 overlap, an even number of them is outside. "winding" for meshes with holes, gaps and
@@ -69,11 +89,17 @@ class PointQueries:
         """
         tracer, work = self._tracer, _work(self._tracer, threads)
         arguments.choice("sign", sign, SIGNS)
-        inside: NDArray[np.bool_] = tracer.inside(_checked(tracer, points), sign, work)
+        checked = _checked(tracer, points)
+        inside: NDArray[np.bool_] = _reported(progress, checked, lambda: tracer.inside(checked, sign, work))
         return inside
 
     def signed_distance(
-        self, points: ArrayLike, *, sign: SignOption = "crossings", threads: int | None = None
+        self,
+        points: ArrayLike,
+        *,
+        sign: SignOption = "crossings",
+        threads: int | None = None,
+        progress: ProgressOption = None,
     ) -> Floats:
         """(n,) the distance of each point to the surface, negative inside; inf for a point that is NaN.
 
@@ -84,12 +110,18 @@ class PointQueries:
         """
         tracer, work = self._tracer, _work(self._tracer, threads)
         arguments.choice("sign", sign, SIGNS)
-        distance: Floats = tracer.signed_distance(_checked(tracer, points), sign, work)
+        checked = _checked(tracer, points)
+        distance: Floats = _reported(progress, checked, lambda: tracer.signed_distance(checked, sign, work))
         return distance
 
 
 def _work(tracer: Tracer, threads: int | None) -> Work:
     return arguments.work(tracer.backend, tracer.lacks, threads, None, "auto", False)
+
+
+def _reported(progress: ProgressOption, points: Points, work: Callable[[], Any]) -> Any:
+    count = shape_of("points", points.points, points.libraries[0])[0]
+    return reported(checked_progress(progress), count, "point", "searching", work)
 
 
 def _checked(tracer: Tracer, points: ArrayLike) -> Points:

@@ -11,7 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 from wive._internal import arguments
 from wive._internal.arguments import USUAL_WORK, LanesOption, Work
 from wive._internal.precision import Floats
-from wive._internal.rays import Rays, check_rays
+from wive._internal.progress import ProgressOption, checked_progress, reported
+from wive._internal.rays import Rays, check_rays, ray_count
 from wive._internal.segments import visible
 from wive._internal.shaped import query_shaped
 from wive._internal.spawn import spawn_from
@@ -52,6 +53,7 @@ class Queries:
         in_flight: int | None = None,
         lanes: LanesOption = "auto",
         stats: bool = False,
+        progress: ProgressOption = None,
     ) -> Hits | tuple[Hits, Stats]:
         """The closest hit of each ray with tmin <= t <= tmax.
 
@@ -71,6 +73,8 @@ class Queries:
             lanes: lanes of a node per thread, for backend "warp": 8 gives a ray one thread (throughput), 1
                 gives it eight (latency), "auto" chooses by device and number of rays.
             stats: return `(hits, stats)`, with what each ray visited.
+            progress: True shows a bar, if there is tqdm; or a callable, called as progress(done, total) with
+                numbers of rays, as for `Scene`.
 
         Results depend on none of `threads`, `in_flight` and `lanes`, nor on how rays are split into batches.
         A ray misses if its origin is NaN or infinite, its direction is NaN, infinite or zero, a number of it
@@ -82,7 +86,13 @@ class Queries:
         backends than the scene's raises ValueError.
         """
         return self._query(
-            self._tracer.intersect, (origins, directions, tmin, tmax), threads, in_flight, lanes, stats
+            self._tracer.intersect,
+            (origins, directions, tmin, tmax),
+            threads,
+            in_flight,
+            lanes,
+            stats,
+            progress=progress,
         )
 
     @overload
@@ -104,13 +114,20 @@ class Queries:
         in_flight: int | None = None,
         lanes: LanesOption = "auto",
         stats: bool = False,
+        progress: ProgressOption = None,
     ) -> NDArray[np.bool_] | tuple[NDArray[np.bool_], Stats]:
         """(n,) bool: whether each ray hits anything with tmin <= t <= tmax; arguments as for `intersect`.
 
         Of the rays' leading shape if that is another, as all that queries return for each ray.
         """
         return self._query(
-            self._tracer.occluded, (origins, directions, tmin, tmax), threads, in_flight, lanes, stats
+            self._tracer.occluded,
+            (origins, directions, tmin, tmax),
+            threads,
+            in_flight,
+            lanes,
+            stats,
+            progress=progress,
         )
 
     @overload
@@ -144,6 +161,7 @@ class Queries:
         stats: bool = False,
         touching: bool = False,
         max_bytes: int | None = None,
+        progress: ProgressOption = None,
     ) -> AllHits | tuple[AllHits, Stats]:
         """Every crossing of each ray with the surface at tmin <= t <= tmax, however many there are.
 
@@ -179,6 +197,7 @@ class Queries:
             stats,
             touching,
             max_bytes,
+            progress,
         )
 
     @overload
@@ -211,13 +230,23 @@ class Queries:
         lanes: LanesOption = "auto",
         stats: bool = False,
         touching: bool = False,
+        progress: ProgressOption = None,
     ) -> NDArray[np.int32] | tuple[NDArray[np.int32], Stats]:
         """(n,) int32: how many hits `intersect_all` finds for each ray; arguments are the same."""
         return self._query(
-            self._tracer.count, (origins, directions, tmin, tmax), threads, in_flight, lanes, stats, touching
+            self._tracer.count,
+            (origins, directions, tmin, tmax),
+            threads,
+            in_flight,
+            lanes,
+            stats,
+            touching,
+            progress=progress,
         )
 
-    def visible(self, a: ArrayLike, b: ArrayLike, *, threads: int | None = None) -> NDArray[np.bool_]:
+    def visible(
+        self, a: ArrayLike, b: ArrayLike, *, threads: int | None = None, progress: ProgressOption = None
+    ) -> NDArray[np.bool_]:
         """(n,) bool: whether the open segment between each point of `a` and its point of `b` is free.
 
         A triangle is in the way if the segment meets it and it separates the ends: each is farther off the
@@ -232,6 +261,7 @@ class Queries:
                 arrays in host memory give an array of their library. Points are not rounded to the scene's
                 precision, their rays are.
             threads: how many to use; None is every core. For CPU backends.
+            progress: True for a bar, or a callable of (done, total) in segments, as for `Scene`.
 
         Raises ValueError or TypeError, in one line naming the argument.
 
@@ -239,7 +269,13 @@ class Queries:
         """
         tracer = self._tracer
         work = arguments.work(tracer.backend, tracer.lacks, threads, None, "auto", False)
-        free: NDArray[np.bool_] = visible(tracer, self._faces, a, b, work)
+        free: NDArray[np.bool_] = reported(
+            checked_progress(progress),
+            ray_count(a, b),
+            "segment",
+            "looking",
+            lambda: visible(tracer, self._faces, a, b, work),
+        )
         return free
 
     def spawn(self, prim: ArrayLike, uv: ArrayLike, directions: ArrayLike) -> Floats:
@@ -277,8 +313,14 @@ class Queries:
         stats: bool,
         touching: bool = False,
         max_bytes: int | None = None,
+        progress: ProgressOption = None,
     ) -> Answer | tuple[Answer, Stats]:
         """Check a query's arguments; its answer, with the counters if `stats`."""
+        if progress is not None and checked_progress(progress) is not False:
+            options = threads, in_flight, lanes, stats, touching, max_bytes
+            return reported(
+                progress, ray_count(*rays), "ray", "tracing", lambda: self._query(query, rays, *options)
+            )
         tracer = self._tracer
         usual = threads is None and in_flight is None and stats is False and touching is False
         if usual and max_bytes is None and type(lanes) is str and lanes == "auto":

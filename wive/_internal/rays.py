@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import math
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
@@ -20,7 +21,7 @@ from wive._internal.arrays import (
 )
 from wive._internal.host_arrays import place_of, to_numpy
 from wive._internal.precision import FLOAT32, Floats, Real
-from wive._internal.shapes import has_many_axes
+from wive._internal.shapes import has_many_axes, shape_of
 
 NAMES = ("origins", "directions", "tmin", "tmax")
 Libraries = tuple[Library, Library, Library, Library]
@@ -65,6 +66,20 @@ _of_numpy = functools.partial(tuple.__new__, Rays)
 def rays_of_numpy(origins: Any, directions: Any, tmin: Any, tmax: Any) -> Rays:
     """Rays (n,3) of NumPy's arrays."""
     return _of_numpy((origins, directions, tmin, tmax, NUMPY, ALL_NUMPY, True))
+
+
+def ray_count(*values: ArrayLike) -> int:
+    """How many rays origins and directions, and what else, are for; 0 if they are no arrays of vectors."""
+    counts = [0]
+    for value in values:
+        library = library_of(value)
+        try:
+            *leading, columns = shape_of("", value, library)
+        except (TypeError, ValueError):  # the query says what is wrong
+            continue
+        if columns == 3:
+            counts.append(math.prod(leading))
+    return max(counts)
 
 
 def check_rays(

@@ -18,6 +18,7 @@ from wive._internal.distant import MOST_COORDINATE
 from wive._internal.error_bounds import ROUNDINGS, UNIT_ROUNDOFF
 from wive._internal.host_arrays import host_arrays
 from wive._internal.precision import FLOAT64, Floats
+from wive._internal.progress import part
 from wive._internal.ray_shapes import flat_ends
 from wive._internal.rays import ALL_NUMPY, Rays
 from wive._internal.shapes import Leading
@@ -63,8 +64,8 @@ def visible(tracer: Tracer, faces: NDArray[np.int32], a: ArrayLike, b: ArrayLike
     for begin in range(0, count, CHUNK):
         end = min(begin + CHUNK, count)
         rows = ends[0].part(begin, end), ends[1].part(begin, end)
-        part = free[begin:end]
-        part &= ~_blocked(tracer, mesh, rows, (ends[0].error, ends[1].error), center, work)
+        with part(begin / count, end / count):
+            free[begin:end] &= ~_blocked(tracer, mesh, rows, (ends[0].error, ends[1].error), center, work)
     answer = library.from_numpy(free)
     return answer if leading is None else Leading(library, leading)(answer)
 
@@ -101,13 +102,16 @@ def _blocked(
 
     origins, directions = _cpu.segment_rays(*ends, center.tolist(), work.threads)
     rays = Rays(origins, directions, MARGIN, 1 - MARGIN, NUMPY, ALL_NUMPY)
-    closest, _ = tracer.intersect(rays, work._replace(touching=False))
-    blocked = between(closest.prim, np.arange(len(origins)))
+    with part(0, 0.5):
+        closest, _ = tracer.intersect(rays, work._replace(touching=False))
+    with part(0.5, 0.5):
+        blocked = between(closest.prim, np.arange(len(origins)))
     (rest,) = np.nonzero(~blocked)
     if len(rest) == 0:
         return blocked
     rays = rays._replace(origins=origins[rest], directions=directions[rest], tmin=-MARGIN, tmax=1 + MARGIN)
-    every, _ = tracer.intersect_all(rays, work)
+    with part(0.5, 1):
+        every, _ = tracer.intersect_all(rays, work)
     row = rest[every.ray]
     blocked[row[between(every.prim, row)]] = True
     return blocked

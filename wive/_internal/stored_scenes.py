@@ -16,9 +16,13 @@ from wive._internal import shared_memory
 from wive._internal.files import PathLike, atomic_write
 from wive._internal.lines import one_line
 from wive._internal.npzfile import check_input
+from wive._internal.progress import ProgressOption, progress_of
 from wive._internal.storage import Options
 from wive._internal.tree_file import MAGIC, Content, content_of, image_of, is_image, tree_of
 from wive.geoms import Geoms
+
+# Bytes that are written at once.
+CHUNK = 1 << 24
 
 
 class Place(NamedTuple):
@@ -82,13 +86,21 @@ def is_stored_file(path: PathLike) -> bool:
 
 
 def save_file(
-    path: PathLike, bvh: _cpu.Bvh, faces: NDArray[np.int32], geoms: Geoms | None, options: Options
+    path: PathLike,
+    bvh: _cpu.Bvh,
+    faces: NDArray[np.int32],
+    geoms: Geoms | None,
+    options: Options,
+    progress: ProgressOption = None,
 ) -> None:
     """Write the tree, its mesh and its options; the file is whole or as it was."""
     image = image_of(bvh, faces, geoms, options)
-    with atomic_write(path) as file:
+    with progress_of(progress, image.size, "B", "saving") as asked, atomic_write(path) as file:
         for piece in image.pieces():
-            file.write(piece)
+            for begin in range(0, len(piece), CHUNK):
+                file.write(piece[begin : begin + CHUNK])
+                if asked is not None:
+                    asked.at(file.tell() / image.size)
 
 
 def open_file(path: PathLike) -> _cpu.Bvh:

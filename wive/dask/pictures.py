@@ -99,7 +99,7 @@ def _tile(carried: CarriedScene, plan: Plan, rows: NDArray[np.int64]) -> Image:
     begin, end = int(rows[0]), int(rows[-1]) + 1
     image: Image = np.zeros(plan.shape, np.float32)  # of which only these rows take memory
     with _cpu.DefaultFloats():
-        render_rows(carried.scene, plan, image, begin, end, lambda rows: None)
+        render_rows(carried.scene, plan, image, begin, end)
     return image[begin:end].copy()
 
 

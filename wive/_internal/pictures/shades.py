@@ -5,7 +5,7 @@ Pixels are traced in bands of rows, sample by sample, so memory is bounded whate
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,7 @@ from wive._internal.picture_rays import pixel_centres
 from wive._internal.pictures.albedo import Albedo
 from wive._internal.pictures.sampling import cosine_directions, pcg4d, to_unit
 from wive._internal.precision import Floats
+from wive._internal.progress import part
 from wive.hits import Hits
 from wive.scene import Scene
 
@@ -24,7 +25,6 @@ BAND_PIXELS = 1 << 16
 OCCLUSION_RAYS = 4
 
 Float64 = NDArray[np.float64]
-Advance = Callable[[int], object]
 
 
 class Band:
@@ -71,7 +71,7 @@ class Shader:
         """(n,3) or (n,1) radiance at the hits, and how many rays were traced for it."""
         raise NotImplementedError
 
-    def render(self, image: Image, frame: Float64, spp: int, begin: int, end: int, advance: Advance) -> int:
+    def render(self, image: Image, frame: Float64, spp: int, begin: int, end: int) -> int:
         """Write the mean of all samples to rows [begin, end); returns how many rays were traced."""
         height, width = image.shape[:2]
         samples = -(-spp // self.rays_per_camera_ray)
@@ -80,14 +80,14 @@ class Shader:
             band = Band(frame, first, last, width, height, self.scene)
             sums = np.zeros((len(band.pixels), 3), np.float64)
             for sample in range(samples):
-                hits, directions, hit = band.hits(sample, self.seed, self.threads)
-                values, traced = self.value(hits, directions, band.pixels[hit], sample)
+                done, rows = first + (last - first) * sample / samples - begin, (last - first) / samples
+                with part(done / (end - begin), (done + rows) / (end - begin)):
+                    hits, directions, hit = band.hits(sample, self.seed, self.threads)
+                    values, traced = self.value(hits, directions, band.pixels[hit], sample)
                 if self.background:
                     sums += self.background
                 sums[hit] += values - self.background
                 rays += len(band.pixels) + traced
-                done, before = (_share(last - first, count, samples) for count in (sample + 1, sample))
-                advance(done - before)
             image[first:last] = (sums / samples).reshape(last - first, width, 3)
         return rays
 
@@ -157,11 +157,6 @@ class AmbientOcclusion(Shader):
         return np.minimum(t.astype(np.float64) / self.reach, 1.0)
 
 
-def _share(rows: int, done: int, samples: int) -> int:
-    """How many rows so many samples of a band are worth, in whole numbers for the bar."""
-    return rows * done // samples
-
-
 def bands(begin: int, end: int, width: int) -> Iterator[tuple[int, int]]:
     """Those of rows [begin, end) that are traced together."""
     rows = max(1, BAND_PIXELS // width)
@@ -175,13 +170,7 @@ def dots(a: NDArray[np.float64], b: Floats) -> NDArray[np.float64]:
 
 
 def render_depth(
-    image: Image,
-    frame: Float64,
-    scene: Scene,
-    threads: int | None,
-    begin: int,
-    end: int,
-    advance: Advance,
+    image: Image, frame: Float64, scene: Scene, threads: int | None, begin: int, end: int
 ) -> int:
     """Write t of the rays through the pixels' centres, inf on a miss, to rows [begin, end) of image (h,w)."""
     height, width = map(int, image.shape)
@@ -190,6 +179,7 @@ def render_depth(
     for first, last in bands(begin, end, width):
         directions = (centre + y[first:last, None, None] * top) + x[:, None] * right
         rays = np.ascontiguousarray(directions.reshape(-1, 3), np.dtype(scene.precision))
-        image[first:last] = scene.intersect(eye, rays, threads=threads).t.reshape(last - first, width)
-        advance(last - first)
+        with part((first - begin) / (end - begin), (last - begin) / (end - begin)):
+            t = scene.intersect(eye, rays, threads=threads).t
+        image[first:last] = t.reshape(last - first, width)
     return (end - begin) * width

@@ -1,0 +1,274 @@
+"""Rays of a file or of arrays, read in order, a piece at a time."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, DTypeLike, NDArray
+
+from wive import _cpu
+from wive._internal.arguments import nan_if_masked
+from wive._internal.arguments import rays as checked_rays
+from wive._internal.files import PathLike
+from wive._internal.lines import one_line
+from wive._internal.npy_rows import ArrayRows, Header, Rows
+from wive._internal.npzfile import Npz, check_input, file_rows, open_npy_or_npz
+from wive._internal.precision import FLOAT64
+
+EXPECTED = "a file of rays, (n,6) or (n,8) in an .npy or `origins` and `directions` in an .npz"
+NAMES = ("ox", "oy", "oz", "dx", "dy", "dz", "tmin", "tmax")
+SKIPPED = "_"
+# Bytes of rays under one checksum.
+BLOCK = 1 << 20
+
+Array = NDArray[Any]
+Rays = tuple[Any, Any, Any, Any]  # origins, directions, tmin, tmax
+LIMITS = 0.0, np.inf
+RaySource = PathLike | ArrayLike | Sequence[ArrayLike]
+
+
+class Raw(NamedTuple):
+    """What a file without a header holds: numbers of a dtype, so many columns per ray."""
+
+    dtype: np.dtype[Any]
+    columns: tuple[str, ...] = NAMES[:6]
+
+    def header(self, head: bytes, size: int) -> Header:
+        """As of an npy file; ValueError if the file does not hold whole rows."""
+        row = self.dtype.itemsize * len(self.columns)
+        if size % row:
+            raise ValueError(f"holds {size} bytes, no multiple of {row}, {len(self.columns)} of {self.dtype}")
+        return (size // row, len(self.columns)), False, self.dtype, 0
+
+
+def raw_format(dtype: DTypeLike, columns: str | Sequence[str] | None = None) -> Raw:
+    """The format, checked; columns are names, or a text of names with commas between."""
+    try:
+        found = np.dtype(dtype)
+    except (TypeError, ValueError):
+        found = np.dtype(object)
+    if found.kind not in "fiu":
+        raise ValueError(
+            f"dtype of raw rays must be one of real numbers, such as float32 or >f8, got {dtype!s:.40}"
+        )
+    if columns is None:
+        return Raw(found)
+    names = tuple(columns.split(",") if isinstance(columns, str) else columns)
+    known = [name for name in names if name != SKIPPED]
+    if len(set(known)) != len(known) or not set(NAMES[:6]) <= set(known) <= set(NAMES):
+        raise ValueError(
+            f"columns of raw rays must be each of {', '.join(NAMES[:6])}, maybe tmin, tmax, and {SKIPPED} "
+            f"for what is to be skipped, got {one_line(','.join(map(str, names))):.80}"
+        )
+    return Raw(found, names)
+
+
+class RayReader:
+    """Rays, read in order; there are `count`."""
+
+    def __init__(
+        self, count: int, sources: list[Rows], taken: Callable[[list[Array]], Rays], kind: str
+    ) -> None:
+        """`taken` makes rays of rows of the sources; `kind` says of what dtypes and shapes these are."""
+        self.count, self.kind = count, kind
+        self.checksums = [RunningChecksum() for _ in sources]
+        self._sources, self._taken = sources, taken
+
+    def read(self, count: int, checksummed: bool = False) -> Rays:
+        """The next rays, and `checksums` of all before, if that is so since the first."""
+        blocks = [source.read(count) for source in self._sources]
+        if checksummed:
+            for checksum, block in zip(self.checksums, blocks, strict=True):
+                checksum.add(block)
+        return self._taken(blocks)
+
+    def skip(self, count: int) -> None:
+        """Leave the next rays out."""
+        for source in self._sources:
+            source.skip(min(count, self.count))
+
+    @property
+    def checksum(self) -> list[str]:
+        """Of all rays read, of each array."""
+        return [checksum.text for checksum in self.checksums]
+
+
+class RunningChecksum:
+    """A checksum of bytes that doesn't depend on the pieces they are added in."""
+
+    def __init__(self) -> None:
+        """Of nothing."""
+        self._blocks = 0
+        self._last, self._used = np.zeros(BLOCK, np.uint8), 0
+
+    def add(self, array: Array) -> None:
+        """Add the array's bytes."""
+        data = np.ascontiguousarray(array).reshape(-1).view(np.uint8)
+        while len(data):
+            taken = data[: BLOCK - self._used]
+            if len(taken) == BLOCK:
+                self._end(taken)
+            else:
+                self._last[self._used : self._used + len(taken)] = taken
+                self._used += len(taken)
+                if self._used == BLOCK:
+                    self._end(self._last)
+                    self._used = 0
+            data = data[len(taken) :]
+
+    @property
+    def text(self) -> str:
+        """The checksum."""
+        return f"{self._blocks:016x}{_cpu.checksum(self._last[: self._used], 1):016x}"
+
+    def _end(self, block: NDArray[np.uint8]) -> None:
+        both = np.array([self._blocks, _cpu.checksum(block, 1)], np.uint64)
+        self._blocks = _cpu.checksum(both.view(np.uint8), 1)
+
+
+@contextmanager
+def open_rays(source: RaySource, raw: Raw | None = None) -> Iterator[RayReader]:
+    """Rays of a file, or of arrays: (n,6), (n,8), or (origins, directions, tmin, tmax), while the block runs.
+
+    Raises OSError, TypeError, or ValueError in one line that names the file, or the argument if it is none.
+    """
+    if not isinstance(source, str | bytes | os.PathLike):
+        if raw is not None:
+            raise ValueError("raw is only for files of rays, got arrays: leave it out")
+        yield _of_arrays(source)
+        return
+    name = one_line(check_input(source))
+    if raw is not None:
+        rows = file_rows(check_input(source), "a file of raw rays", raw.header)
+        try:
+            yield _of_table(rows, raw.columns)
+        finally:
+            rows.close()
+        return
+    with open_npy_or_npz(source, EXPECTED) as loaded:
+        if not isinstance(loaded, Npz):
+            if len(loaded.shape) != 2 or loaded.shape[1] not in (6, 8):
+                raise ValueError(f"{name}: not {EXPECTED}: found shape {loaded.shape}")
+            with _named(name):
+                reader = _of_table(loaded, NAMES[: loaded.shape[1]])
+            yield reader
+            return
+        if not {"origins", "directions"} <= loaded.keys():
+            raise ValueError(f"{name}: not {EXPECTED}: found arrays {loaded.listed()}")
+        given: list[Rows | Any] = []
+        try:
+            for key, default in zip(
+                ("origins", "directions", "tmin", "tmax"), (None, None, *LIMITS), strict=True
+            ):
+                if key not in loaded:
+                    given.append(default)
+                    continue
+                rows = loaded.rows(key)
+                is_common = len(rows.shape) == 0 or (key in ("origins", "directions") and rows.shape == (3,))
+                given.append(loaded[key] if is_common else rows)
+            with _named(name):
+                reader = _of_parts(given)
+            yield reader
+        finally:
+            for part in given:
+                if isinstance(part, Rows):
+                    part.close()
+
+
+@contextmanager
+def _named(name: str) -> Iterator[None]:
+    """Name the file in errors about its arrays."""
+    try:
+        yield
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"{name}: {error}") from error
+
+
+def _of_arrays(source: Any) -> RayReader:
+    if isinstance(source, tuple) and 2 <= len(source) <= 4:
+        given = [*source, *LIMITS[len(source) - 2 :]]
+        arrays = [_array(value) for value in given]
+        parts: list[Rows | Any] = [
+            array if array.ndim == 0 or (i < 2 and array.shape == (3,)) else ArrayRows(array)
+            for i, array in enumerate(arrays)
+        ]
+        return _of_parts(parts)
+    table = _array(source)
+    if table.ndim != 2 or table.shape[1] not in (6, 8):
+        raise ValueError(
+            "rays must be a file name, an array (n,6) or (n,8), or a tuple (origins, directions) and maybe "
+            f"tmin, tmax, got shape {table.shape}"
+        )
+    return _of_table(ArrayRows(table), NAMES[: table.shape[1]])
+
+
+def _array(value: Any) -> Array:
+    """The value as an array, mapped files as they are, NaN for masked numbers."""
+    array = value if isinstance(value, np.ndarray) else np.asarray(value)
+    return nan_if_masked(array) if isinstance(array, np.ma.MaskedArray) else array
+
+
+def _of_table(rows: Rows, names: Sequence[str]) -> RayReader:
+    """Rays whose numbers are columns of one array."""
+    places = {name: i for i, name in enumerate(names)}
+    vectors = [[places[name] for name in NAMES[:3]], [places[name] for name in NAMES[3:6]]]
+
+    def taken(blocks: list[Array]) -> Rays:
+        (table,) = blocks
+        origins, directions = (_columns(table, columns) for columns in vectors)
+        limits = [
+            np.ascontiguousarray(table[:, places[name]]) if name in places else usual
+            for name, usual in zip(NAMES[6:], LIMITS, strict=True)
+        ]
+        return origins, directions, limits[0], limits[1]
+
+    checked_rays(*taken([np.empty((0, len(names)), rows.dtype)]), FLOAT64)
+    return RayReader(rows.shape[0], [rows], taken, f"{rows.dtype.str} {','.join(names)}")
+
+
+def _of_parts(parts: list[Rows | Any]) -> RayReader:
+    """Origins, directions, tmin and tmax, each an array of its own, or the same for all rays."""
+    sources = [part for part in parts if isinstance(part, Rows)]
+    counts = [part.shape[0] for part in parts[:2] if isinstance(part, Rows)]
+    count = max(counts, default=1)
+
+    def taken(blocks: list[Array]) -> Rays:
+        left = iter(blocks)
+        origins, directions, low, high = (next(left) if isinstance(part, Rows) else part for part in parts)
+        return origins, directions, low, high
+
+    # What is wrong with dtypes and shapes is wrong with no row as well.
+    checked_rays(*taken([np.empty((0, *source.shape[1:]), source.dtype) for source in sources]), FLOAT64)
+    if any(len(source.shape) > 0 and source.shape[0] != count for source in sources):
+        if len(set(counts)) > 1:
+            raise ValueError(f"origins and directions must be equally many, got {counts[0]} and {counts[1]}")
+        name, shape = next(
+            (name, part.shape)
+            for name, part in zip(("tmin", "tmax"), parts[2:], strict=True)
+            if isinstance(part, Rows) and part.shape[0] != count
+        )
+        raise ValueError(
+            f"{name} must be one number or have shape ({count},), one per ray, got shape {shape}"
+        )
+    kinds = [
+        f"{part.dtype.str}{part.shape[1:]}" if isinstance(part, Rows) else str(np.asarray(part).tolist())
+        for part in parts
+    ]
+    return RayReader(count, sources, taken, " ".join(kinds))
+
+
+def _columns(table: Array, columns: list[int]) -> Array:
+    """Three columns of a C-contiguous table, C-contiguous; neighbours are copied as one item per row."""
+    first, size = columns[0], table.dtype.itemsize
+    if columns != [first, first + 1, first + 2] or not table.flags.c_contiguous:
+        return np.ascontiguousarray(table[:, columns])
+    items = (
+        np.ndarray(len(table), f"V{3 * size}", table.data, first * size, (table.shape[1] * size,))
+        if len(table)
+        else np.empty(0, f"V{3 * size}")
+    )
+    return items.copy().view(table.dtype).reshape(-1, 3)
