@@ -1,5 +1,6 @@
 """The command line, called as a function and as a program."""
 
+import contextlib
 import os
 import signal
 import subprocess
@@ -274,8 +275,11 @@ def test_a_failed_picture_leaves_the_old_one(ball, tmp_path, capsys, monkeypatch
 ELSEWHERE = tempfile.gettempdir()
 
 
+WIVE = sys.executable, "-m", "wive"
+
+
 def program(*arguments: object, **options) -> subprocess.Popen[str]:
-    command = [sys.executable, "-m", "wive", *map(str, arguments)]
+    command = [*WIVE, *map(str, arguments)]
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
     return subprocess.Popen(command, text=True, cwd=ELSEWHERE, **pipes, **options)
 
@@ -311,30 +315,32 @@ def test_a_reader_that_leaves_ends_the_program_silently(ball):
 
 
 def test_ctrl_c_ends_a_long_render_with_130_and_no_file(ball, tmp_path):
-    process = program(
-        "render",
-        ball,
-        "-o",
-        tmp_path / "x.png",
-        "--spp",
-        2000,
-        "--width",
-        400,
-        env={**os.environ, "PYTHONUNBUFFERED": "1"},
+    terminal, errors_to = os.openpty()  # elsewhere there are no bars
+    process = subprocess.Popen(
+        [*WIVE, "render", str(ball), "-o", str(tmp_path / "x.png"), "--spp", "2000", "--width", "400"],
+        stdout=subprocess.PIPE,
+        stderr=errors_to,
+        cwd=ELSEWHERE,
         # A shell that runs the tests in the background may have made them ignore the signal.
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )
+    os.close(errors_to)
+    errors = ""
     try:
-        while "rendering" not in process.stderr.read(20):
-            assert process.poll() is None
+        while "rendering" not in errors:
+            errors += os.read(terminal, 1000).decode()
         time.sleep(0.3)
         process.send_signal(signal.SIGINT)
-        output, errors = process.communicate(timeout=20)
+        output, _ = process.communicate(timeout=20)
+        with contextlib.suppress(OSError):  # at the end of what was written to a terminal
+            while more := os.read(terminal, 1000).decode():
+                errors += more
     finally:
         process.kill()
+        os.close(terminal)
     assert process.returncode == 130
-    assert output == ""
-    assert errors.endswith("wive: interrupted\n")
+    assert output == b""
+    assert errors.endswith("wive: interrupted\r\n")
     assert "Traceback" not in errors
     assert list(tmp_path.iterdir()) == [ball]
 

@@ -30,9 +30,9 @@ COPIED = 1 << 22
 # What an interrupted run must have in common with the one that goes on.
 COMMON = {
     "wive": "version of wive",
-    "mesh": "mesh",
     "accuracy": "accuracy",
     "precision": "precision",
+    "mesh": "mesh",
     "query": "query",
     "touching": "touching",
     "rays": "number of rays",
