@@ -22,6 +22,7 @@ BENCHES = {
     "pareto": "speed against leaks, wrong triangles and the error of t, with Embree and Warp",
     "python": "embreex, trimesh, Warp and wive from Python, NumPy arrays in and out",
     "quality": 'what quality="high" saves in steps per ray and costs in build time',
+    "stream": "rays of files in pieces, to files, over one batch in memory, all cores",
     "gpu-prepare": "not a bench: packs Warp and scenes for a GPU machine without a package index",
     "quote": "not a bench: writes the tables of docs/benchmarks.md from bench/results",
     "convert": "not a bench: makes a scene file of meshes in other formats",

@@ -75,6 +75,12 @@ def test_bench_moving_times_every_way(bench: Callable[..., dict[str, Any]]) -> N
     assert min(row[way] for way in ("geom_ms", "held_ms", "first_ms", "refit_ms", "build_ms")) > 0
 
 
+def test_bench_stream_compares_every_form_of_files(bench: Callable[..., dict[str, Any]]) -> None:
+    content = bench("stream", "--scenes", SCENE)
+    assert len({row["form"] for row in content["rows"]}) == 5
+    assert all(row["ratio"] > 0 for row in content["rows"])
+
+
 def test_bench_paper_renders_embrees_picture(bench: Callable[..., dict[str, Any]]) -> None:
     content = bench("paper", "--scenes", SCENE)
     assert content["rows"]

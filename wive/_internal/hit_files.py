@@ -7,10 +7,10 @@ that an interrupted run can go on. Results don't depend on how rays are split, s
 from __future__ import annotations
 
 import errno
-import fcntl
 import json
 import os
 import shutil
+import sys
 import time
 import zlib
 from contextlib import suppress
@@ -163,6 +163,10 @@ class HitFile:
 
     def _take_part(self, resume: bool) -> None:
         """Make the folder, or go on with one that is there."""
+        if sys.platform == "win32":
+            raise OSError(f"{self.name}: can't be written piece by piece on Windows: use wive.stream")
+        import fcntl
+
         try:
             os.makedirs(self.part, 0o700, exist_ok=True)  # as private as a file that is replaced may be
             self._lock = os.open(self.part, os.O_RDONLY)
