@@ -92,7 +92,9 @@ class Queries:
             in_flight,
             lanes,
             stats,
-            progress=progress,
+            False,
+            None,
+            progress,
         )
 
     @overload
@@ -127,7 +129,9 @@ class Queries:
             in_flight,
             lanes,
             stats,
-            progress=progress,
+            False,
+            None,
+            progress,
         )
 
     @overload
@@ -241,7 +245,8 @@ class Queries:
             lanes,
             stats,
             touching,
-            progress=progress,
+            None,
+            progress,
         )
 
     def visible(
@@ -316,20 +321,19 @@ class Queries:
         progress: ProgressOption = None,
     ) -> Answer | tuple[Answer, Stats]:
         """Check a query's arguments; its answer, with the counters if `stats`."""
-        if progress is not None and checked_progress(progress) is not False:
-            options = threads, in_flight, lanes, stats, touching, max_bytes
-            return reported(
-                progress, ray_count(*rays), "ray", "tracing", lambda: self._query(query, rays, *options)
-            )
         tracer = self._tracer
         usual = threads is None and in_flight is None and stats is False and touching is False
-        if usual and max_bytes is None and type(lanes) is str and lanes == "auto":
+        if usual and max_bytes is None and progress is None and type(lanes) is str and lanes == "auto":
             at_once: Answer | None = tracer.at_once(query.__name__, *rays)
             if at_once is not None:
                 return at_once
             work = USUAL_WORK
         else:
             options = threads, in_flight, lanes, stats, touching, max_bytes
+            if progress is not None and checked_progress(progress) is not False:
+                return reported(
+                    progress, ray_count(*rays), "ray", "tracing", lambda: self._query(query, rays, *options)
+                )
             work = arguments.work(tracer.backend, tracer.lacks, *options)
         checked = check_rays(*rays, tracer.backend, tracer.device)
         answer, counters = query(checked, work) if checked.is_flat else query_shaped(query, checked, work)
