@@ -49,7 +49,8 @@ def undercut() -> Figure:
     colors = np.where(part["undercut"][:, None], to_rgb(ORANGE), (0.82, 0.84, 0.86))
     figure, ax = vase(lambda hits: colors[hits.prim], part["scene"])
     ax.text(20, 420, "undercut", size=13, weight="bold", color=ORANGE)
-    ax.text(20, 446, "reached from above or below", size=11, color=FAINT)
+    ax.text(20, 446, "reached from", size=11, color=FAINT)
+    ax.text(20, 466, "above or below", size=11, color=FAINT)
     return figure
 
 
