@@ -90,3 +90,12 @@ def test_the_drawings_are_those_of_the_script(
                 TEXT.findall((folder / name).read_text()) for folder in (tmp_path, DOCS / "images")
             )
             assert drawn == kept, f"{name}: run docs/figures/how_it_works.py again"
+
+
+def test_every_recipe_has_its_picture(figures: SimpleNamespace) -> None:
+    import recipes
+
+    names = {path.stem.removeprefix("recipe_") for path in (DOCS / "images").glob("recipe_*.png")}
+    assert names == set(recipes.PICTURES)
+    text = (DOCS / "recipes.md").read_text(encoding="utf-8")
+    assert all(f"images/recipe_{name}.png" in text for name in names)

@@ -174,10 +174,6 @@ class Queries:
         touches an edge or a vertex, and one through the border of an open surface, may have no hit here,
         though `intersect` reports one.
 
-        Arguments are those of `intersect`, and:
-            touching: every triangle that the ray touches instead, all of those at an edge or a vertex, so
-                that the first is what `intersect` returns. Accuracy "fast" does this always.
-
         Each ray's hits are sorted by ascending t, at equal t by ascending prim. Rays of a leading shape such
         as (h,w) are numbered in C order: ray (i,j) is i * w + j.
 
@@ -185,7 +181,11 @@ class Queries:
         Warp traces twice, to count and to fill, and waits for the device in between: CUDA graphs can't
         capture this query. A hit takes 32 bytes there until all are sorted, then 16 (in float64 64, then 28).
 
+        Arguments are those of `intersect`, and:
+
         Arguments:
+            touching: every triangle that the ray touches instead, all of those at an edge or a vertex, so
+                that the first is what `intersect` returns. Accuracy "fast" does this always.
             max_bytes: what the hits may take while they are found and sorted. None is three quarters of the
                 memory that is available, control groups (containers) considered.
 
