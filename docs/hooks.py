@@ -43,6 +43,7 @@ def on_page_markdown(markdown: str, page: Any, config: Any, files: Files) -> str
             place = f"{COPIES}/{path}"
             if files.get_file_from_path(place) is None and (ROOT / path).is_file():
                 files.append(File.generated(config, place, abs_src_path=str(ROOT / path)))
+        place = posixpath.relpath(place, posixpath.dirname(page.file.src_uri) or ".")
         return f"[{text}]({place}{anchor})"
 
     return LINK.sub(on_site, markdown)
