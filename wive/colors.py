@@ -11,7 +11,10 @@ from wive._internal.formats.kinds import kind_of
 from wive._internal.room import room_for
 from wive.meshfile import MeshSource, content_of
 
-READERS = {"ply": "ply", "off": "off", "obj": "obj", "gltf": "gltf", "glb": "gltf", "vrm": "gltf"}
+READERS = {
+    **{kind: kind for kind in ("ply", "off", "obj", "gltf")},
+    **{"glb": "gltf", "vrm": "gltf", "3mf": "threemf"},
+}
 # What the whitest surfaces of a file reflect, as white paint does; and those that it gives no colour.
 WHITE, UNKNOWN = 0.8, 0.6
 

@@ -8,11 +8,8 @@ from __future__ import annotations
 
 import io
 from collections.abc import Iterator
-from typing import Any
+from typing import Generic, TypeVar
 from urllib.parse import unquote
-
-import numpy as np
-from numpy.typing import NDArray
 
 from wive._internal.archives import Archive
 from wive._internal.formats import Mesh
@@ -26,13 +23,15 @@ CHUNK = 1 << 16
 # A mesh's text packs to a fifth or a tenth of its length. What is long and packs to less than a hundredth is
 # made to keep a reader busy.
 LONG, MOST_PACKED = 1 << 30, 100
+PartKind = TypeVar("PartKind", bound=Part)
 
 
-class Package:
-    """The model parts of a 3MF archive, each parsed when it is first used."""
+class Package(Generic[PartKind]):
+    """The model parts of a 3MF archive, each parsed when it is first used, as this class of parts."""
 
-    def __init__(self, data: bytes) -> None:
+    def __init__(self, data: bytes, kind: type[PartKind]) -> None:
         """Read the table of contents, and find the part that the package begins with."""
+        self._kind = kind
         try:
             self._archive = Archive(io.BytesIO(data))
         except MemoryError:
@@ -42,10 +41,10 @@ class Package:
                 f"archive: expected a 3MF package ({reason(error)}): the file is damaged"
             ) from None
         self._names = {name.lstrip("/").lower(): name for name in self._archive.names}
-        self._parts: dict[str, Part] = {}
+        self._parts: dict[str, PartKind] = {}
         self.root = self._root()
 
-    def part(self, path: str, place: str) -> Part:
+    def part(self, path: str, place: str) -> PartKind:
         """The model part at this path of the package, which `place` refers to."""
         name = path.lstrip("/").lower()
         if name not in self._names:
@@ -55,7 +54,7 @@ class Package:
                 f"{place}: refers to {path!r:.60}, which is not in the package: the file is damaged"
             )
         if name not in self._parts:
-            self._parts[name] = Part(self._chunks(name), self._names[name])
+            self._parts[name] = self._kind(self._chunks(name), self._names[name])
         return self._parts[name]
 
     def _root(self) -> str:
@@ -104,19 +103,30 @@ def read(data: bytes, name: str) -> Mesh:
     Each copy of an object has its own vertices, all of the object's. Numbers are in the file's unit.
     """
     with named(name):
-        return _read(Package(data))
+        copies = placed(Package(data, Part))
+        return joined((found.vertices, found.triangles, matrix[None]) for _, found, matrix in copies)
 
 
-def _read(package: Package) -> Mesh:
+def placed(package: Package[PartKind]) -> Iterator[tuple[PartKind, Object, Matrix]]:
+    """Each copy of a mesh that the build places, in order: its part, its object and its matrix."""
     root = package.part(package.root, "_rels/.rels")
     if not root.items:
         raise ValueError(f"{package.root}: build: has no item, so no object is placed")
     counts: dict[int, Counts] = {}  # of an object and its components, by id()
     Counts.of(0, 0, [count(package, package.root, item, counts) for item in root.items]).check()
-    return joined(draw(package, root, counts))
+    stack = [(package.root, item, IDENTITY) for item in reversed(root.items)]
+    while stack:
+        path, reference, outer = stack.pop()
+        path, found = target(package, path, reference)
+        if counts[id(found)] is NOTHING:  # nested empty objects may have copies without number
+            continue
+        matrix = outer if reference.matrix is IDENTITY else outer @ reference.matrix
+        if len(found.vertices):
+            yield package.part(path, reference.place), found, matrix
+        stack += [(path, component, matrix) for component in reversed(found.components)]
 
 
-def target(package: Package, path: str, reference: Reference) -> tuple[str, Object]:
+def target(package: Package[PartKind], path: str, reference: Reference) -> tuple[str, Object]:
     """The path of the part that holds an object, and the object; `path` is the part that refers to it."""
     path = path if reference.path is None else reference.path
     found = package.part(path, reference.place).objects.get(reference.object)
@@ -131,7 +141,7 @@ def target(package: Package, path: str, reference: Reference) -> tuple[str, Obje
     return path, found
 
 
-def count(package: Package, path: str, reference: Reference, counts: dict[int, Counts]) -> Counts:
+def count(package: Package[PartKind], path: str, reference: Reference, counts: dict[int, Counts]) -> Counts:
     """What a reference places."""
     stack = [target(package, path, reference)]
     first = stack[0][1]
@@ -152,22 +162,6 @@ def count(package: Package, path: str, reference: Reference, counts: dict[int, C
             entered.add(id(found))
             stack += missing.values()
     return counts[id(first)]
-
-
-def draw(
-    package: Package, root: Part, counts: dict[int, Counts]
-) -> Iterator[tuple[NDArray[Any], NDArray[np.int32], Matrix]]:
-    """Vertices, corners and matrix of each copy of a mesh, in order."""
-    stack = [(package.root, item, IDENTITY) for item in reversed(root.items)]
-    while stack:
-        path, reference, outer = stack.pop()
-        path, found = target(package, path, reference)
-        if counts[id(found)] is NOTHING:  # nested empty objects may have copies without number
-            continue
-        matrix = outer if reference.matrix is IDENTITY else outer @ reference.matrix
-        if len(found.vertices):
-            yield found.vertices, found.triangles, matrix[None]
-        stack += [(path, component, matrix) for component in reversed(found.components)]
 
 
 def reason(error: Exception) -> str:
