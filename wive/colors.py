@@ -12,7 +12,7 @@ from wive._internal.room import room_for
 from wive.meshfile import MeshSource, content_of
 
 READERS = {
-    **{kind: kind for kind in ("ply", "off", "obj", "gltf")},
+    **{kind: kind for kind in ("ply", "off", "obj", "dae", "gltf")},
     **{"glb": "gltf", "vrm": "gltf", "3mf": "threemf"},
 }
 # What the whitest surfaces of a file reflect, as white paint does; and those that it gives no colour.
@@ -42,5 +42,6 @@ def load_colors(source: MeshSource, *, file_type: str | None = None) -> NDArray[
         colours = import_module(f"wive._internal.formats.colours.{READERS[kind]}").read(data, name, folder)
     if colours is None:
         return None
-    reflected = np.where(np.isnan(colours), UNKNOWN, WHITE * np.nan_to_num(colours))
+    is_unknown = np.isnan(colours).any(axis=-1, keepdims=True)
+    reflected = np.where(is_unknown, UNKNOWN, WHITE * colours)
     return np.clip(reflected, 0, WHITE).astype(np.float32)

@@ -7,10 +7,9 @@ trimesh leaves out nodes that it does not understand, without a word.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wive._internal.formats import Mesh
 from wive._internal.formats.dae.geometry import Geometry, read_geometry
@@ -27,7 +26,17 @@ def read(data: bytes, name: str) -> Mesh:
     Each copy of a geometry has its own vertices, all of the geometry's. Unit and up axis are the file's.
     """
     with named(name):
-        return Scene(Document(data), name).mesh()
+        copies = Scene(Document(data), name).placed()
+        return joined((one.shape.vertices, one.shape.triangles, one.matrix[None]) for one in copies)
+
+
+class Copy(NamedTuple):
+    """A geometry as an `instance_geometry` places it."""
+
+    instance: Element
+    geometry: Element
+    shape: Geometry
+    matrix: Matrix
 
 
 class Scene:
@@ -35,7 +44,7 @@ class Scene:
 
     def __init__(self, document: Document, name: str) -> None:
         """Find the scene."""
-        self._document, self._name = document, name
+        self.document, self._name = document, name
         scene = document.root.first("scene")
         instance = None if scene is None else scene.first("instance_visual_scene")
         if instance is None:
@@ -45,14 +54,24 @@ class Scene:
         self._matrices: dict[int, Matrix] = {}
         self._counts: dict[int, Counts] = {}
 
-    def mesh(self) -> Mesh:
-        """All copies of geometries, joined."""
+    def placed(self) -> Iterator[Copy]:
+        """All copies of geometries, in order."""
         self._count()
         self._counts[id(self._root)].check()
-        return joined(self._draw())
+        stack: list[tuple[Element, Element, Matrix]] = [(self._root, self._root, IDENTITY)]
+        while stack:
+            instance, element, outer = stack.pop()
+            if self._counts[id(element)] is NOTHING:  # nested empty nodes may have copies without number
+                continue
+            if element.tag == "geometry":
+                yield Copy(instance, element, self._geometries[id(element)], outer)
+                continue
+            inner = self._matrices[id(element)]
+            matrix = outer if inner is IDENTITY else outer @ inner
+            stack += [(*held, matrix) for held in reversed(self._below(element))]
 
-    def _below(self, node: Element) -> list[Element]:
-        """The nodes and geometries that a node holds, in order."""
+    def _below(self, node: Element) -> list[tuple[Element, Element]]:
+        """What places the nodes and geometries that a node holds, and these, in order."""
         found = []
         for child in node.all(*DRAWN):
             if child.tag == "instance_controller":
@@ -61,9 +80,10 @@ class Scene:
                     "glTF, or with its modifiers applied"
                 )
             if child.tag == "node":
-                found.append(child)
+                found.append((child, child))
             else:
-                found.append(self._document.target(child, "url", child.tag.removeprefix("instance_")))
+                kind = child.tag.removeprefix("instance_")
+                found.append((child, self.document.target(child, "url", kind)))
         return found
 
     def _count(self) -> None:
@@ -75,10 +95,10 @@ class Scene:
             if key in self._counts:
                 stack.pop()
             elif element.tag == "geometry":
-                one = self._geometries[key] = read_geometry(self._document, element, self._name)
+                one = self._geometries[key] = read_geometry(self.document, element, self._name)
                 self._counts[key] = Counts.of(len(one.vertices), len(one.triangles))
             else:
-                below = self._below(element)
+                below = [held for _, held in self._below(element)]
                 missing = {id(one): one for one in below if id(one) not in self._counts}
                 if missing and key in entered:
                     raise ValueError(f"{element.place}: holds itself: the file is damaged")
@@ -88,21 +108,6 @@ class Scene:
                     self._counts[key] = Counts.of(0, 0, [self._counts[id(one)] for one in below])
                     if self._counts[key] is not NOTHING:  # others may be of cameras, with other transforms
                         self._matrices[key] = matrix_of(element)
-
-    def _draw(self) -> Iterator[tuple[NDArray[Any], NDArray[np.int32], Matrix]]:
-        """Vertices, corners and matrix of each copy of a geometry, in order."""
-        stack: list[tuple[Element, Matrix]] = [(self._root, IDENTITY)]
-        while stack:
-            element, outer = stack.pop()
-            if self._counts[id(element)] is NOTHING:  # nested empty nodes may have copies without number
-                continue
-            if element.tag == "geometry":
-                one = self._geometries[id(element)]
-                yield one.vertices, one.triangles, outer[None]
-                continue
-            inner = self._matrices[id(element)]
-            matrix = outer if inner is IDENTITY else outer @ inner
-            stack += [(child, matrix) for child in reversed(self._below(element))]
 
 
 def matrix_of(node: Element) -> Matrix:

@@ -124,7 +124,13 @@ class Document(Handler):
                 f"{element.place}: {key}: {address!r:.60} is in another file, which is not read: export the "
                 "scene as one file"
             )
-        found = self.ids.get(address[1:]) or self.ids.get(unquote(address[1:]))
+        found = self.find(address)
         if found is None or found.tag not in tags:
             raise ValueError(f"{element.place}: {key}: expected the id of a {tags[0]}, found {address!r:.60}")
         return found
+
+    def find(self, address: str) -> Element | None:
+        """The element that "#id" stands for."""
+        if not address.startswith("#"):
+            return None
+        return self.ids.get(address[1:]) or self.ids.get(unquote(address[1:]))
