@@ -44,8 +44,8 @@ def read(data: bytes, name: str, dtype: np.dtype[Any]) -> Mesh:
     is_vertex = text.same(text.heads, b"v")
     is_face = text.same(text.heads, b"f") | text.same(text.heads, b"fo")
     _check_others(text, text.heads[~(is_vertex | is_face)])
-    vertices = _vertices(text, is_vertex, dtype)
-    corners, sizes = _corners(text, text.heads[is_vertex], is_face)
+    vertices = vertices_of(text, is_vertex, dtype)
+    corners, sizes = corners_of(text, text.heads[is_vertex], is_face)
     return vertices, triangulate(vertices, sizes, corners, name)
 
 
@@ -84,7 +84,8 @@ def _check_others(text: Text, heads: Ints) -> None:
             )
 
 
-def _vertices(text: Text, is_vertex: Bools, dtype: np.dtype[Any]) -> NDArray[Any]:
+def vertices_of(text: Text, is_vertex: Bools, dtype: np.dtype[Any]) -> NDArray[Any]:
+    """The vertices (v,3)."""
     heads, counts = text.heads[is_vertex], text.counts[is_vertex] - 1
     expected = "expected 3 numbers, 4 with a weight or 6 to 8 with a colour"
     text.check(np.isin(counts, NUMBERS), heads, expected)
@@ -93,7 +94,7 @@ def _vertices(text: Text, is_vertex: Bools, dtype: np.dtype[Any]) -> NDArray[Any
     return text.reals(heads[:, None] + np.arange(1, 4), dtype)
 
 
-def _corners(text: Text, vertex_heads: Ints, is_face: Bools) -> tuple[Ints, Ints]:
+def corners_of(text: Text, vertex_heads: Ints, is_face: Bools) -> tuple[Ints, Ints]:
     """The vertex of each corner of all faces, from 0, and how many corners each face has."""
     heads, sizes = text.heads[is_face], text.counts[is_face] - 1
     text.check(sizes >= 3, heads, "expected a face of at least three corners")

@@ -130,29 +130,31 @@ class Text:
             result[batch] = np.logical_and.reduceat(allowed[listed], before)
         return result
 
-    def integers(self, words: Ints, ends: Ints | None = None) -> Ints:
-        """The words, or what they are up to `ends`, as integers; beyond int64 they are its limits."""
-        return self._numbers(words, self.ends[words] if ends is None else ends, np.dtype(np.int64))
+    def integers(self, words: Ints, ends: Ints | None = None, starts: Ints | None = None) -> Ints:
+        """The words, or pieces of them from `starts` to `ends`, as integers; beyond int64 its limits."""
+        starts = self.starts[words] if starts is None else starts
+        return self._numbers(words, starts, self.ends[words] if ends is None else ends, np.dtype(np.int64))
 
     def reals(self, words: Ints, dtype: np.dtype[Any]) -> NDArray[Any]:
         """The words as float32 or float64, whichever is nearest to the decimal number."""
-        values = self._numbers(words.reshape(-1), self.ends[words.reshape(-1)], np.dtype(np.float64))
+        flat = words.reshape(-1)
+        values = self._numbers(flat, self.starts[flat], self.ends[flat], np.dtype(np.float64))
         if dtype == np.float32:
-            values = self._rounded(values, words.reshape(-1))
+            values = self._rounded(values, flat)
         return values.reshape(words.shape)
 
-    def _numbers(self, words: Ints, ends: Ints, dtype: np.dtype[Any]) -> NDArray[Any]:
+    def _numbers(self, words: Ints, starts: Ints, ends: Ints, dtype: np.dtype[Any]) -> NDArray[Any]:
         values = np.empty(len(words), dtype)
         for first in range(0, len(words), BATCH):
             batch = slice(first, first + BATCH)
-            listed, after = self._listed(self.starts[words[batch]], ends[batch] + 1)
+            listed, after = self._listed(starts[batch], ends[batch] + 1)
             listed[after - 1] = ord(" ")
             try:
                 found = np.fromstring(listed.tobytes(), dtype, sep=" ")
             except (ValueError, DeprecationWarning):  # some word is no number; NumPy before 2.4 stops there
                 found = values[:0]
             if len(found) != len(after):
-                raise self._no_number(words[batch], ends[batch], dtype)
+                raise self._no_number(words[batch], starts[batch], ends[batch], dtype)
             values[batch] = found
         return values
 
@@ -162,10 +164,10 @@ class Text:
         after = np.cumsum(sizes)
         return self._bytes[np.repeat(starts - (after - sizes), sizes) + np.arange(after[-1])], after
 
-    def _no_number(self, words: Ints, ends: Ints, dtype: np.dtype[Any]) -> ValueError:
+    def _no_number(self, words: Ints, starts: Ints, ends: Ints, dtype: np.dtype[Any]) -> ValueError:
         what, pattern = ("an integer", INTEGER) if dtype.kind == "i" else ("a number", NUMBER)
-        for word, end in zip(words.tolist(), ends.tolist(), strict=True):
-            found = self.data[self.starts[word] : end]
+        for word, start, end in zip(words.tolist(), starts.tolist(), ends.tolist(), strict=True):
+            found = self.data[start:end]
             if not pattern.fullmatch(found):
                 is_comma = pattern is NUMBER and pattern.fullmatch(found.replace(b",", b".", 1))
                 mend = ": write decimal points, not commas" if is_comma else ""

@@ -15,6 +15,7 @@ from urllib.parse import unquote, unquote_to_bytes
 
 from numpy.typing import NDArray
 
+from wive._internal.formats.beside import beside, is_below
 from wive._internal.formats.gltf.fields import Fields, listed, members, short, whole
 
 JSON_CHUNK, BIN_CHUNK = 0x4E4F534A, 0x004E4942
@@ -82,6 +83,19 @@ class Document:
             )
         return data[start : start + size], whole(view, "byteStride", here, 0)
 
+    def image(self, index: int, place: str) -> bytes | str | None:
+        """The bytes or the path of image `index`; None if it is in a file that is missing or elsewhere."""
+        here = f"images[{index}]"
+        image = self.item("images", index, place)
+        if "uri" not in image:
+            return bytes(self.view(whole(image, "bufferView", here), here)[0])
+        uri = image["uri"]
+        if not isinstance(uri, str):
+            raise ValueError(f"{here}: uri: expected text, found {short(uri)}")
+        if uri[:5].lower() == "data:":
+            return decode_data_uri(uri, here)
+        return None if self._folder is None else beside(self._folder, unquote(uri))
+
     def _has_data(self, index: int, place: str) -> bool:
         buffer = self.item("buffers", index, place)
         return "uri" in buffer or (index == 0 and self._binary is not None)
@@ -110,8 +124,8 @@ class Document:
             raise ValueError(f"{place}: uri: expected text, found {short(uri)}")
         if uri[:5].lower() == "data:":
             return memoryview(decode_data_uri(uri, place))
-        parts = unquote(uri).replace("\\", "/").split("/")
-        if ":" in parts[0] or not parts[0] or ".." in parts or "\0" in uri:
+        path = unquote(uri).replace("\\", "/")
+        if not is_below(path):
             raise ValueError(
                 f"{place}: uri {short(uri)} leads out of the file's folder: put the buffer beside the file "
                 "and write its name alone, or save the model as .glb"
@@ -121,12 +135,12 @@ class Document:
                 f"{place}: is in another file, {short(uri)}, which bytes and file objects can't refer to: "
                 "pass the path of the .gltf file, or save the model as .glb"
             )
-        path = os.path.join(self._folder, *parts)
-        if not os.path.isfile(path):
+        found = beside(self._folder, path)
+        if found is None:
             raise ValueError(
                 f"{place}: is in {short(uri)}, which is missing or no ordinary file: put it beside this file"
             )
-        with open(path, "rb") as file:
+        with open(found, "rb") as file:
             held = os.fstat(file.fileno()).st_size  # before a huge claim of bytes is allocated
             return memoryview(file.read(min(size, held)))
 
