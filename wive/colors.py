@@ -12,7 +12,7 @@ from wive._internal.room import room_for
 from wive.meshfile import MeshSource, content_of
 
 READERS = {
-    **{kind: kind for kind in ("ply", "off", "obj", "dae", "gltf")},
+    **{kind: kind for kind in ("ply", "off", "obj", "stl", "dae", "gltf")},
     **{"glb": "gltf", "vrm": "gltf", "3mf": "threemf"},
 }
 # What the whitest surfaces of a file reflect, as white paint does; and those that it gives no colour.

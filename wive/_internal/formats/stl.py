@@ -29,13 +29,17 @@ FACET_START = re.compile(rb"(?<!\S)facet\s+normal\s+[-+.\dni]\S*\s+[-+.\dni]")
 
 def read(data: bytes, name: str, dtype: np.dtype[Any]) -> Mesh:
     """Vertices, of this dtype in text and float32 else, and triangles."""
-    # Headers of binary files may begin with "solid", but text has no zero bytes.
-    is_text = data.startswith(UTF_16) or b"\0" not in data
-    corners = _text(data, name, dtype) if is_text and not is_binary_stl(data) else _binary(data, name)
+    corners = _text(data, name, dtype) if is_text(data) else facets(data, name)["corners"]
     return corners.reshape(-1, 3), np.arange(corners.size // 3).reshape(-1, 3)
 
 
-def _binary(data: bytes, name: str) -> NDArray[np.float32]:
+def is_text(data: bytes) -> bool:
+    """Whether a file is text: headers of binary files may begin with "solid", but text has no zero bytes."""
+    return (data.startswith(UTF_16) or b"\0" not in data) and not is_binary_stl(data)
+
+
+def facets(data: bytes, name: str) -> NDArray[Any]:
+    """The facets of a binary file, of the dtype FACET."""
     if len(data) < HEADER_BYTES:
         raise ValueError(
             f"{name}: byte {len(data)}: expected {HEADER_BYTES} bytes of a header, got the file's end: "
@@ -55,7 +59,7 @@ def _binary(data: bytes, name: str) -> NDArray[np.float32]:
             f"{name}: byte {HEADER_BYTES - 4}: expected the number of facets, {whole:,} by the file's "
             f"length, got {count:,}: mend the header"
         )
-    return np.frombuffer(data, FACET, count, HEADER_BYTES)["corners"]
+    return np.frombuffer(data, FACET, count, HEADER_BYTES)
 
 
 def _text(data: bytes, name: str, dtype: np.dtype[Any]) -> NDArray[Any]:
