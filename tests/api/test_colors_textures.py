@@ -10,9 +10,9 @@ import pytest
 from support.gltf_files import Model, primitive
 
 import wive
-from wive._internal.formats.colours import linear
+from wive._internal.formats.colours import linear, texture_mean
 from wive._internal.formats.colours.texture import MOST_PIXELS, Textures
-from wive._internal.formats.colours.texture_mean import CLAMP, MIRROR, REPEAT, means
+from wive._internal.formats.colours.texture_mean import CLAMP, MIRROR, REPEAT, Means
 
 Image = pytest.importorskip("PIL.Image")
 RED, GREEN, BLUE, WHITE = (255, 0, 0), (0, 255, 0), (0, 0, 255), (255, 255, 255)
@@ -23,6 +23,10 @@ MIDDLES = [(0.25, 0.25), (0.75, 0.25), (0.25, 0.75), (0.75, 0.75)]
 EXPECTED = 0.8 * np.array([RED, GREEN, BLUE, WHITE]) / 255
 SMALL = np.array([(-0.1, -0.1), (0.1, -0.1), (0, 0.2)])
 GRAY = 0.8 * ((0.5 + 0.055) / 1.055) ** 2.4  # of Kd 0.5, by hand
+
+
+def means_over(*arguments) -> np.ndarray:
+    return Means().over(*arguments)
 
 
 def file(pixels: np.ndarray, form: str = "PNG", mode: str = "RGB") -> bytes:
@@ -53,14 +57,14 @@ def test_means_are_near_the_exact_ones_by_areas_within_texels():
     random = np.random.default_rng(5)
     texels = random.integers(0, 256, (9, 7, 3), dtype=np.uint8)
     triangles = random.random((60, 3, 2))
-    found = means(texels, triangles)
+    found = means_over(texels, triangles)
     colours = linear(texels, 255)
     for triangle, colour in zip(triangles, found, strict=True):
         areas = np.array([[overlap(triangle * (7, 9), x, y) for x in range(7)] for y in range(9)])
         exact = (areas[..., None] * colours).sum(axis=(0, 1)) / areas.sum()
         np.testing.assert_allclose(colour, exact, atol=0.06)
     halves = np.array([[[0, 0], [1, 0], [0, 1]], [[1, 1], [0, 1], [1, 0]]])
-    np.testing.assert_allclose(means(texels, halves).mean(axis=0), colours.mean(axis=(0, 1)), atol=0.01)
+    np.testing.assert_allclose(means_over(texels, halves).mean(axis=0), colours.mean(axis=(0, 1)), atol=0.01)
 
 
 def test_a_triangle_within_a_texel_has_exactly_its_colour():
@@ -68,7 +72,7 @@ def test_a_triangle_within_a_texel_has_exactly_its_colour():
     texels = random.integers(0, 256, (5, 8, 3), dtype=np.uint8)
     column, row = random.integers(0, 8, 200), random.integers(0, 5, 200)
     places = (np.stack([column, row], 1)[:, None] + 0.01 + 0.98 * random.random((200, 3, 2))) / (8, 5)
-    np.testing.assert_array_equal(means(texels, places), linear(texels, 255)[row, column])
+    np.testing.assert_array_equal(means_over(texels, places), linear(texels, 255)[row, column])
 
 
 def test_colours_that_change_evenly_have_the_mean_at_the_centre():
@@ -82,7 +86,7 @@ def test_colours_that_change_evenly_have_the_mean_at_the_centre():
         x = np.sort(triangle[:, 0]) * 256
         height = np.interp(width + 0.5, x, [0, 1, 0])
         exact = (height * share[width]).sum() / height.sum()
-        np.testing.assert_allclose(means(texels, triangle[None])[0], exact, atol=0.02)
+        np.testing.assert_allclose(means_over(texels, triangle[None])[0], exact, atol=0.02)
 
 
 def test_places_beyond_the_texture_repeat_are_mirrored_or_stay_at_its_border():
@@ -95,8 +99,10 @@ def test_places_beyond_the_texture_repeat_are_mirrored_or_stay_at_its_border():
         CLAMP: [0, 0, 0, 3, 3, 3, 3],
     }
     for wrap, columns in expected.items():
-        np.testing.assert_array_equal(means(texels, places, (wrap, REPEAT)), linear(texels, 255)[0, columns])
-        turned = means(texels.transpose(1, 0, 2), places[..., ::-1], (REPEAT, wrap))
+        np.testing.assert_array_equal(
+            means_over(texels, places, (wrap, REPEAT)), linear(texels, 255)[0, columns]
+        )
+        turned = means_over(texels.transpose(1, 0, 2), places[..., ::-1], (REPEAT, wrap))
         np.testing.assert_array_equal(turned, linear(texels, 255)[0, columns])
 
 
@@ -104,15 +110,37 @@ def test_places_that_are_not_finite_have_no_colour_and_huge_ones_some():
     places = np.zeros((6, 3, 2))
     places[0, 1, 0], places[1, 2, 1], places[2, 0, 0] = np.nan, np.inf, 1.7e308
     places[3, 0, 0], places[4, 0, 0], places[5] = 1e300, -1e-320, 1e18
-    found = means(QUARTERS, places)
+    found = means_over(QUARTERS, places)
     assert np.isnan(found[:3]).all()
     assert ((found[3:] >= 0) & (found[3:] <= 1)).all()
 
 
-def test_many_large_triangles_do_not_take_forever():
-    places = np.tile(np.array([[0, 0], [1e6, 0], [0, 1e6]]), (100_000, 1, 1))
-    found = means(QUARTERS, places)
-    assert np.isfinite(found).all()
+def test_the_samples_of_all_triangles_of_a_file_are_bounded(monkeypatch):
+    monkeypatch.setattr("wive._internal.formats.colours.texture_mean.MOST_SAMPLES", 5000)
+    means, sampled = Means(), []
+    look_up = texture_mean._texels
+
+    def count(places, weights, *rest):
+        sampled.append(len(places) * weights.shape[1])
+        return look_up(places, weights, *rest)
+
+    monkeypatch.setattr(texture_mean, "_texels", count)
+    large, small = np.array([[0, 0], [1e6, 0], [0, 1e6]]), SMALL / 10
+    for triangles, most in (
+        (np.array([large]), 4096),
+        (np.array([small] * 50 + [large] * 50), 904),
+        ([large] * 70, 70),
+    ):
+        assert np.isfinite(means.over(QUARTERS, np.array(triangles))).all()
+        assert len(triangles) <= sum(sampled) <= most
+        sampled.clear()
+
+
+def test_the_pixels_of_all_textures_of_a_file_are_bounded(monkeypatch):
+    monkeypatch.setattr("wive._internal.formats.colours.texture.MOST_OF_ALL", 11)
+    textures = Textures()
+    found = [textures.get(key, lambda: file(QUARTERS)) for key in range(4)]
+    assert [one is not None for one in found] == [True, True, False, False]
 
 
 def gltf(places: np.ndarray, pixels: bytes | None = None, uri: str | None = None, **fields) -> Model:
@@ -248,7 +276,7 @@ def test_obj_textures_of_polygons_are_those_of_their_triangles(tmp_path):
     triangles = wive.load_mesh(path)[1]
     assert found.shape == (len(triangles), 1, 3)
     places = dict(zip(range(5), [*middles()[0], *middles()[3][:2]], strict=True))
-    exact = means(
+    exact = means_over(
         QUARTERS, np.array([[places[corner] for corner in each] for each in triangles[:3].tolist()])
     )
     np.testing.assert_allclose(found[:3, 0], 0.8 * exact, rtol=1e-5)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from wive._internal.formats.colours import Colours
 from wive._internal.formats.colours.texture import Textures
-from wive._internal.formats.colours.texture_mean import CLAMP, MIRROR, REPEAT, means
+from wive._internal.formats.colours.texture_mean import CLAMP, MIRROR, REPEAT, Means
 from wive._internal.formats.gltf.accessors import describe, values
 from wive._internal.formats.gltf.document import Document
 from wive._internal.formats.gltf.fields import Fields, index_of, members, numbers, whole
@@ -26,7 +26,7 @@ class BaseTextures:
     def __init__(self, document: Document) -> None:
         """Read nothing yet."""
         self._document = document
-        self._textures = Textures()
+        self._textures, self._means = Textures(), Means()
 
     def means(self, primitive: Primitive) -> Colours | None:
         """Linear colours (f,3) over a primitive's triangles; None without a texture that can be read."""
@@ -50,7 +50,8 @@ class BaseTextures:
         image = index_of({**texture, **webp}, "source", here)
         if index is None or image is None:
             return None
-        texels = self._textures.get(image, lambda: document.image(image, here))
+        source = document.image(image, here)
+        texels = self._textures.get(source, lambda: document.picture(source, f"images[{image}]"))
         if texels is None:
             return None
         accessor = describe(document, index, f"{primitive.place}: {attribute}", "VEC2")
@@ -60,7 +61,7 @@ class BaseTextures:
                 f"found {accessor.count}"
             )
         places = values(document, accessor).astype(np.float64)[triangles(document, primitive)]
-        return means(texels, _moved(places, transform, here), self._wrap(texture, here))
+        return self._means.over(texels, _moved(places, transform, here), self._wrap(texture, here))
 
     def _wrap(self, texture: Fields, place: str) -> tuple[str, str]:
         index = index_of(texture, "sampler", place)

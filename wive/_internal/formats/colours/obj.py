@@ -8,7 +8,7 @@ from wive._internal.formats.colours import Colours, linear, linear_guessed
 from wive._internal.formats.colours.mtl import Material, read_materials
 from wive._internal.formats.colours.obj_textures import places_of
 from wive._internal.formats.colours.texture import Texels, Textures
-from wive._internal.formats.colours.texture_mean import CLAMP, REPEAT, means
+from wive._internal.formats.colours.texture_mean import CLAMP, REPEAT, Means
 from wive._internal.formats.obj import text_of
 from wive._internal.formats.text import Bools, Ints, Text
 
@@ -44,16 +44,16 @@ def _add_textures(
     colours: Colours, text: Text, is_vertex: Bools, is_face: Bools, materials: list[Material], used: Ints
 ) -> None:
     """Multiply the colours (f,1,3) of triangles that have textures which can be read by these."""
-    textures, places = Textures(), None
-    for at in np.unique(used).tolist():
-        one = materials[at]
+    textures, means, places = Textures(), Means(), None
+    order = np.argsort(used, kind="stable")
+    for which in np.split(order, np.flatnonzero(np.diff(used[order])) + 1) if len(order) else ():
+        one = materials[used[which[0]]]
         texels = _texels(textures, one.texture)
         if texels is None:
             continue
         places = places_of(text, is_vertex, is_face) if places is None else places
-        which = used == at
         moved = one.moved(places[which])
-        found = means(texels, moved, (CLAMP, CLAMP) if one.is_clamped else (REPEAT, REPEAT))
+        found = means.over(texels, moved, (CLAMP, CLAMP) if one.is_clamped else (REPEAT, REPEAT))
         if one.colour is None:
             colours[which, 0] = found
         else:

@@ -15,54 +15,55 @@ Texels = NDArray[np.uint8]  # (height,width,3), sRGB, the top row first
 # Formats that hold pixels alone: Pillow's others run programs, as EPS does, or follow files.
 FORMATS = "PNG", "JPEG", "WEBP", "BMP", "TGA", "TIFF", "GIF", "JPEG2000", "DDS"
 MOST_PIXELS = 1 << 26  # 8192 x 8192: a small file may claim any number
+MOST_OF_ALL = 1 << 31  # pixels of all textures of a file, which take half a minute
 MOST_HELD = 1 << 28  # bytes of textures that are kept for the next triangles
 BYTES_OF_PIXEL = 8  # Pillow's, beside those of the array
 
 
 class Textures:
-    """Textures by a key, each read once unless they are too many to be kept."""
+    """Textures by a key, each read once unless they are too large to be kept together."""
 
     def __init__(self) -> None:
         """Read nothing yet."""
         self._held: dict[Hashable, Texels | None] = {}
+        self._left = MOST_OF_ALL
 
     def get(self, key: Hashable, find: Callable[[], bytes | str | None]) -> Texels | None:
         """The texture whose bytes or path `find` returns; None if there is none that can be read."""
         if key not in self._held:
             source = find()
-            texels = None if source is None else read_texture(source)
+            texels = None if source is None else self._read(source)
             held = sum(one.nbytes for one in self._held.values() if one is not None)
             if texels is not None and held + texels.nbytes > MOST_HELD:
                 self._held = {key: one for key, one in self._held.items() if one is None}
             self._held[key] = texels
         return self._held[key]
 
+    def _read(self, source: bytes | str) -> Texels | None:
+        """The pixels of an image file or of its bytes.
 
-def read_texture(source: bytes | str) -> Texels | None:
-    """The pixels of an image file or of its bytes.
-
-    None without Pillow, and if it is damaged, of another format or of more than MOST_PIXELS: a surface then
-    has the colour of its material.
-    """
-    try:
-        from PIL import Image
-    except ImportError:
-        return None
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            with Image.open(
-                io.BytesIO(source) if isinstance(source, bytes) else source, formats=FORMATS
-            ) as image:
-                width, height = image.size
-                if not 0 < width * height <= MOST_PIXELS:
-                    return None
-                expect_room(BYTES_OF_PIXEL * width * height, np.uint8)
-                if image.mode.startswith("I"):  # of 16 bits, of which Pillow would keep the lower
-                    gray = np.asarray(image).astype(np.int64) >> 8
-                    return np.repeat(np.clip(gray, 0, 255).astype(np.uint8)[..., None], 3, axis=2)
-                return np.array(image.convert("RGB"))
-    except MemoryError:
-        raise
-    except Exception:  # of decoders, which raise what they like on damaged bytes
-        return None
+        None without Pillow, and if the image is damaged, of another format or too large: a surface then has
+        the colour of its material.
+        """
+        try:
+            from PIL import Image
+        except ImportError:
+            return None
+        file = io.BytesIO(source) if isinstance(source, bytes) else source
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")
+                with Image.open(file, formats=FORMATS) as image:
+                    pixels = image.width * image.height
+                    if not 0 < pixels <= min(MOST_PIXELS, self._left):
+                        return None
+                    self._left -= pixels
+                    expect_room(BYTES_OF_PIXEL * pixels, np.uint8)
+                    if image.mode.startswith("I"):  # of 16 bits, of which Pillow would keep the lower
+                        gray = np.clip(np.asarray(image).astype(np.int64) >> 8, 0, 255)
+                        return np.repeat(gray.astype(np.uint8)[..., None], 3, axis=2)
+                    return np.array(image.convert("RGB"))
+        except MemoryError:
+            raise
+        except Exception:  # of decoders, which raise what they like on damaged bytes
+            return None

@@ -17,41 +17,51 @@ from wive._internal.formats.colours.texture import Texels
 REPEAT, MIRROR, CLAMP = "repeat", "mirror", "clamp"
 SIDE = 1  # texels of the longest side of a part, at most
 MOST_PARTS = 64  # of a side
-MOST_SAMPLES = 1 << 25  # of all triangles together, which take a second or two
+MOST_SAMPLES = 1 << 25  # of all triangles of a file, which take seconds; of each at least one
 BATCH = 1 << 15  # samples looked at together: they stay in the cache
 LINEAR = linear(np.arange(256), 255)
 
 
-def means(texels: Texels, places: NDArray[np.float64], wrap: tuple[str, str] = (REPEAT, REPEAT)) -> Colours:
-    """Linear colours (f,3) over triangles of these texture coordinates (f,3,2), NaN if they aren't finite.
+class Means:
+    """The means over triangles of all textures of a file."""
 
-    Coordinates are from 0 to 1 in the texture, from its left and from its top.
-    """
-    with np.errstate(all="ignore"):
-        corners = places * texels.shape[1::-1]
-        longest = np.hypot(*np.moveaxis(corners - np.roll(corners, 1, axis=1), 2, 0)).max(axis=1)
-        colours = np.full((len(places), 3), np.nan)
-        parts = np.where(np.isfinite(longest), _parts(longest), 0)
-        channels = [np.ascontiguousarray(texels[..., channel]).reshape(-1) for channel in range(3)]
-        for count in np.unique(parts[parts > 0]).tolist():
-            weights = _centres(count)
-            some = max(1, BATCH // len(weights[0]))
-            rows = np.flatnonzero(parts == count)
-            for which in (rows[at : at + some] for at in range(0, len(rows), some)):
-                at = _texels(places[which], weights, texels.shape, wrap)
-                colours[which] = np.stack([LINEAR[one[at]].mean(axis=1) for one in channels], axis=1)
-    return colours
+    def __init__(self) -> None:
+        """Begin with all samples left."""
+        self._left = MOST_SAMPLES
 
+    def over(
+        self, texels: Texels, places: NDArray[np.float64], wrap: tuple[str, str] = (REPEAT, REPEAT)
+    ) -> Colours:
+        """Linear colours (f,3) over triangles of these coordinates (f,3,2), NaN if they aren't finite.
 
-def _parts(longest: NDArray[np.float64]) -> NDArray[np.int64]:
-    """Into how many parts the sides of triangles are cut, powers of two, by their longest sides in texels."""
-    wanted = np.clip(np.nan_to_num(longest, posinf=0) / SIDE, 1, MOST_PARTS)
-    parts = (2 ** np.ceil(np.log2(wanted))).astype(np.int64)
-    most = MOST_PARTS
-    while most > 1 and (parts**2).sum() > MOST_SAMPLES:
-        most //= 2
-        parts = np.minimum(parts, most)
-    return parts
+        Coordinates are from 0 to 1 in the texture, from its left and from its top.
+        """
+        with np.errstate(all="ignore"):
+            corners = places * texels.shape[1::-1]
+            longest = np.hypot(*np.moveaxis(corners - np.roll(corners, 1, axis=1), 2, 0)).max(axis=1)
+            colours = np.full((len(places), 3), np.nan)
+            parts = np.where(np.isfinite(longest), self._parts(longest), 0)
+            listed = texels.reshape(-1, 3)
+            for count in np.unique(parts[parts > 0]).tolist():
+                weights = _centres(count)
+                some = max(1, BATCH // len(weights[0]))
+                rows = np.flatnonzero(parts == count)
+                for which in (rows[at : at + some] for at in range(0, len(rows), some)):
+                    found = np.take(listed, _texels(places[which], weights, texels.shape, wrap), axis=0)
+                    for channel in range(3):  # means along the last axis are faster
+                        colours[which, channel] = np.take(LINEAR, found[..., channel]).mean(axis=1)
+        return colours
+
+    def _parts(self, longest: NDArray[np.float64]) -> NDArray[np.int64]:
+        """Into how many parts sides are cut, powers of two, of triangles with these longest sides in texels."""
+        wanted = np.clip(np.nan_to_num(longest, posinf=0) / SIDE, 1, MOST_PARTS)
+        parts = (2 ** np.ceil(np.log2(wanted))).astype(np.int64)
+        most = MOST_PARTS
+        while most > 1 and (parts**2).sum() > self._left:
+            most //= 2
+            parts = np.minimum(parts, most)
+        self._left -= int((parts**2).sum())
+        return parts
 
 
 def _centres(parts: int) -> NDArray[np.float64]:

@@ -83,18 +83,24 @@ class Document:
             )
         return data[start : start + size], whole(view, "byteStride", here, 0)
 
-    def image(self, index: int, place: str) -> bytes | str | None:
-        """The bytes or the path of image `index`; None if it is in a file that is missing or elsewhere."""
+    def image(self, index: int, place: str) -> str | int:
+        """The URI of image `index`, or its buffer view."""
         here = f"images[{index}]"
         image = self.item("images", index, place)
-        if "uri" not in image:
-            return bytes(self.view(whole(image, "bufferView", here), here)[0])
-        uri = image["uri"]
+        uri = image.get("uri")
+        if uri is None:
+            return whole(image, "bufferView", here)
         if not isinstance(uri, str):
             raise ValueError(f"{here}: uri: expected text, found {short(uri)}")
-        if uri[:5].lower() == "data:":
-            return decode_data_uri(uri, here)
-        return None if self._folder is None else beside(self._folder, unquote(uri))
+        return uri
+
+    def picture(self, source: str | int, place: str) -> bytes | str | None:
+        """The bytes or the path of an image; None if it is in a file that is missing or elsewhere."""
+        if isinstance(source, int):
+            return bytes(self.view(source, place)[0])
+        if source[:5].lower() == "data:":
+            return decode_data_uri(source, place)
+        return None if self._folder is None else beside(self._folder, unquote(source))
 
     def _has_data(self, index: int, place: str) -> bool:
         buffer = self.item("buffers", index, place)
