@@ -34,7 +34,7 @@ def client(tmp_path_factory) -> Iterator["distributed.Client"]:
         "local_directory": str(local),
     }
     with (
-        dask.config.set({"distributed.comm.retry.count": 3}),
+        dask.config.set({"distributed.comm.timeouts.connect": "120s"}),  # machines that run tests are busy
         distributed.LocalCluster(**options) as cluster,
         distributed.Client(cluster) as client,
     ):
