@@ -1,11 +1,14 @@
 """The command line, called as a function and as a program."""
 
 import contextlib
+import fcntl
 import os
 import signal
+import struct
 import subprocess
 import sys
 import tempfile
+import termios
 import time
 
 import numpy as np
@@ -316,6 +319,7 @@ def test_a_reader_that_leaves_ends_the_program_silently(ball):
 
 def test_ctrl_c_ends_a_long_render_with_130_and_no_file(ball, tmp_path):
     terminal, errors_to = os.openpty()  # elsewhere there are no bars
+    fcntl.ioctl(errors_to, termios.TIOCSWINSZ, struct.pack("4H", 24, 100, 0, 0))
     process = subprocess.Popen(
         [*WIVE, "render", str(ball), "-o", str(tmp_path / "x.png"), "--spp", "2000", "--width", "400"],
         stdout=subprocess.PIPE,
