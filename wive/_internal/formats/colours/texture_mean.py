@@ -53,7 +53,7 @@ class Means:
         return colours
 
     def _parts(self, longest: NDArray[np.float64]) -> NDArray[np.int64]:
-        """Into how many parts sides are cut, powers of two, of triangles with these longest sides in texels."""
+        """Into how many parts sides are cut, powers of two, by the longest sides of triangles in texels."""
         wanted = np.clip(np.nan_to_num(longest, posinf=0) / SIDE, 1, MOST_PARTS)
         parts = (2 ** np.ceil(np.log2(wanted))).astype(np.int64)
         most = MOST_PARTS
