@@ -22,10 +22,10 @@ WHITE, UNKNOWN = 0.8, 0.6
 def load_colors(source: MeshSource, *, file_type: str | None = None) -> NDArray[np.float32] | None:
     """The colours in a mesh file, as `wive.render` takes them for `albedo`; None if there are none.
 
-    PLY and OFF: of vertices or faces. OBJ: of vertices, else diffuse colours and textures of materials. glTF:
-    base colours and their textures, times vertex colours. COLLADA: diffuse colours times vertex colours. 3MF:
-    base materials and colour groups. Binary STL: of facets. Pillow reads textures, which give each triangle
-    their mean over it; one that can't be read leaves the material's colour. docs/mesh_files.md has the rules.
+    PLY and OFF: of vertices or faces. OBJ: of vertices, else diffuse colours and textures of materials. glTF
+    and COLLADA: base or diffuse colours and textures, times vertex colours. 3MF: base materials and colour
+    groups. Binary STL: of facets. Pillow reads textures, which give each triangle their mean over it; one that
+    can't be read leaves the material's colour. docs/mesh_files.md has the rules.
 
     Arguments:
         source, file_type: as `load_mesh` takes them.

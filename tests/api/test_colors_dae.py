@@ -1,6 +1,7 @@
 """Colours of COLLADA files: diffuse colours of effects, colours of vertices and corners."""
 
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -132,8 +133,8 @@ def test_materials_that_are_not_in_the_file_have_no_colour(target):
     [
         (SQUARE, effect("e", colour("1 0")), "expected 3 or 4 numbers, found 2"),
         (SQUARE, effect("e", colour("1 0 x")), "could not convert string to float: 'x'"),
-        (with_colours("corners", "1 0 0, 0 1 0"), "", "has the index 2 of a colour, expected at most 1"),
-        (with_colours("vertices", "1 0 0"), "", "has the index 3 of a colour, expected at most 0"),
+        (with_colours("corners", "1 0 0, 0 1 0"), "", "has the index 2 for 2 colours"),
+        (with_colours("vertices", "1 0 0"), "", "has the index 3 for 1 colours"),
         (with_colours("vertices", "1 0, 1 0"), "", "expected params R, G and B in a stride of 2"),
         (
             with_colours("vertices", "1 0 0").replace('k-array" count="1"', 'k-array" count="9"'),
@@ -155,3 +156,101 @@ def test_numbers_out_of_range_are_cut_off_and_those_that_are_none_have_no_colour
     found = wive.load_colors(coloured(SQUARE, node(draw("g", a="#m-e", b="#m-f")), effects))
     np.testing.assert_allclose(found[0, 0], RED, rtol=1e-6)
     np.testing.assert_allclose(found[1, 0], NONE, rtol=1e-6)
+
+
+QUARTERS = np.array([[[255, 0, 0], [0, 255, 0]], [[0, 0, 255], [255, 255, 255]]], np.uint8)
+# Places around the middle of red, at the upper left, and of white, at the lower right; up is positive.
+PLACES = [[0.2, 0.7], [0.3, 0.7], [0.2, 0.8], [0.7, 0.2], [0.8, 0.2], [0.7, 0.3]]
+SAMPLER = (
+    '<newparam sid="surface"><surface type="2D"><init_from>image</init_from></surface></newparam>'
+    '<newparam sid="sampler"><sampler2D><source>surface</source></sampler2D></newparam>'
+)
+NEWER = '<newparam sid="sampler"><sampler2D><instance_image url="#image"/><wrap_s>CLAMP</wrap_s></sampler2D></newparam>'
+FILE = '<image id="image"><init_from>my%20pictures/t.png</init_from></image>'
+
+
+def textured(
+    folder: Path, texture="sampler", more=SAMPLER, image=FILE, places=PLACES, axes="ST", more_inputs=""
+) -> Path:
+    """A document whose first triangle is on red and whose second one is on white."""
+    picture = pytest.importorskip("PIL.Image").fromarray(QUARTERS)
+    (folder / "my pictures").mkdir(exist_ok=True)
+    picture.save(folder / "my pictures" / "t.png")
+    picture.save(folder.parent / "t.png")
+    shape = geometry("g", POINTS, of(primitive("triangles", [0, 1, 2, 0, 2, 3]), "a"))
+    shape = re.sub("<p>.*?</p>", "<p>0 0 1 1 2 2 0 3 2 4 3 5</p>", shape)
+    shape = shape.replace(
+        '<input semantic="NORMAL" source="#n" offset="1"/>',
+        f'{more_inputs}<input semantic="TEXCOORD" source="#k" offset="1" set="3"/>',
+    )
+    shape = shape.replace("<vertices", f"{source(places, 'k', params=axes)}<vertices")
+    effects = effect("e", f'<texture texture="{texture}" texcoord="UV"/>', more=more)
+    bound = draw("g", a="#m-e").replace(
+        'target="#m-e"/>',
+        'target="#m-e"><bind_vertex_input semantic="UV" input_semantic="TEXCOORD" input_set="3"/>'
+        "</instance_material>",
+    )
+    text = coloured(shape, node(bound), effects)
+    path = folder / "m.dae"
+    path.write_bytes(
+        text.replace(b"<library_eff", f"<library_images>{image}</library_images><library_eff".encode())
+    )
+    return path
+
+
+@pytest.mark.parametrize(
+    "fields",
+    [
+        {},
+        {"more": NEWER},
+        {"texture": "image", "more": ""},
+        {"image": FILE.replace("my%20", "./my ")},
+        {"image": '<image id="image"><init_from><ref>my%20pictures/t.png</ref></init_from></image>'},
+        {"places": [[*row, 0] for row in PLACES], "axes": "STP"},
+        {"axes": "UV"},
+        {"more_inputs": '<input semantic="TEXCOORD" source="#g-p" offset="0" set="0"/>'},
+    ],
+)
+def test_textures_are_means_over_triangles(tmp_path, fields):
+    found = wive.load_colors(textured(tmp_path, **fields))
+    np.testing.assert_allclose(found[:, 0], [RED, [0.8] * 3], rtol=1e-6)
+
+
+def test_what_is_beyond_a_texture_is_as_its_sampler_says(tmp_path):
+    right = np.add(PLACES, [1, 0]).tolist()
+    found = wive.load_colors(textured(tmp_path, places=right))
+    np.testing.assert_allclose(found[:, 0], [RED, [0.8] * 3], rtol=1e-6)
+    found = wive.load_colors(textured(tmp_path, places=right, more=NEWER))
+    np.testing.assert_allclose(found[:, 0], [GREEN, [0.8] * 3], rtol=1e-6)
+    found = wive.load_colors(textured(tmp_path, places=right, more=NEWER.replace("CLAMP", "MIRROR")))
+    np.testing.assert_allclose(found[:, 0], [GREEN, BLUE], rtol=1e-6)
+
+
+@pytest.mark.parametrize(
+    "fields",
+    [
+        {"image": FILE.replace("my%20pictures/", "../")},
+        {"image": FILE.replace("my%20pictures/t.png", "file:///etc/passwd")},
+        {"image": FILE.replace("t.png", "none.png")},
+        {"image": FILE.replace("t.png", "")},
+        {"image": '<image id="image"/>'},
+        {"image": ""},
+        {"texture": "g"},
+        {"more": SAMPLER.replace("<source>surface</source>", "")},
+        {"more": SAMPLER.replace("<init_from>image</init_from>", "")},
+    ],
+)
+def test_a_texture_that_can_not_be_read_has_no_colour(tmp_path, fields):
+    folder = tmp_path / "inner"
+    folder.mkdir()
+    assert wive.load_colors(textured(folder, **fields)) is None
+    path = textured(folder)
+    assert wive.load_colors(path) is not None
+    assert wive.load_colors(path.read_bytes()) is None  # bytes have no folder
+
+
+def test_damaged_texture_coordinates_are_one_line(tmp_path):
+    with pytest.raises(
+        ValueError, match=r"m\.dae: line 3: triangles: has the index 5 for 5 places on a texture"
+    ):
+        wive.load_colors(textured(tmp_path, places=PLACES[:5]))

@@ -68,8 +68,8 @@ def positions(document: Document, vertices: Element) -> NDArray[np.float64]:
     return picked(document, inputs[0], "XYZ")
 
 
-def picked(document: Document, one: Element, axes: str, alpha: str = "") -> NDArray[np.float64]:
-    """The rows of three numbers, named after these axes, of the source of an input; `alpha` is left out."""
+def picked(document: Document, one: Element, axes: str, what: str = "positions") -> NDArray[np.float64]:
+    """The rows of an input's source, numbers named after these axes; rows of positions have no others."""
     source = document.target(one, "source", "source")
     accessor = source.one("technique_common").one("accessor")
     array = document.target(accessor, "source", "float_array", "int_array")
@@ -78,17 +78,18 @@ def picked(document: Document, one: Element, axes: str, alpha: str = "") -> NDAr
     count, stride = accessor.whole("count"), accessor.whole("stride", 1)
     start = accessor.whole("offset", 0)
     columns = [at for at, axis in enumerate(names) if axis] or list(range(len(names)))
-    if alpha:
-        columns = [at for at in columns if names[at] != alpha][:3]
-    if sorted(names[at] for at in columns) == sorted(axes):
+    if what != "positions" and set(axes) <= set(names):
         columns = [names.index(axis) for axis in axes]
-    if len(columns) != 3 or max(columns) >= stride:
+    elif what != "positions":
+        columns = columns[: len(axes)]
+    elif sorted(names[at] for at in columns) == sorted(axes):
+        columns = [names.index(axis) for axis in axes]
+    if len(columns) != len(axes) or max(columns) >= stride:
+        expected = f"{', '.join(axes[:-1])} and {axes[-1]}"
         raise ValueError(
-            f"{accessor.place}: expected params {axes[0]}, {axes[1]} and {axes[2]} in a stride of {stride}, "
-            f"found {names}"
+            f"{accessor.place}: expected params {expected} in a stride of {stride}, found {names}"
         )
     if count and start + (count - 1) * stride + max(columns) >= len(values):
-        what = "colours" if alpha else "positions"
         raise ValueError(
             f"{accessor.place}: claims {count} {what} of stride {stride}, {array.place} has {len(values)} "
             "numbers: the file is damaged"
