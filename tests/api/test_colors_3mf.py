@@ -1,5 +1,8 @@
 """Colours of 3MF files: base materials and colour groups, of objects, triangles and corners."""
 
+import io
+import zipfile
+
 import numpy as np
 import pytest
 from support import threemf_files
@@ -30,7 +33,7 @@ def file(
     """A package of an object of a square whose triangles have these attributes, and what places it."""
     plain = threemf_files.mesh(POINTS, [])
     rows = "".join(
-        f'<triangle v1="0" v2="{at + 1}" v3="{at + 2}" {one}/>' for at, one in enumerate(triangles)
+        f'<triangle v1="0" v2="{at % 2 + 1}" v3="{at % 2 + 2}" {one}/>' for at, one in enumerate(triangles)
     )
     shape = plain.replace("<triangles></triangles>", f"<triangles>{rows}</triangles>")
     objects = {
@@ -105,7 +108,7 @@ def test_a_package_without_colours_has_none():
 @pytest.mark.parametrize(
     ("triangle", "resources", "expected"),
     [
-        ('pid="5" p1="2"', BASES, "expected an index below 2, the colours of group '5', found '2'"),
+        ('pid="5" p1="2"', BASES, "group '5': expected an index below 2, found '2'"),
         ('pid="5" p1="-1"', BASES, "expected an index below 2"),
         ('pid="5" p1="0" p2="x" p3="0"', BASES, "found 'x'"),
         ('pid="5" p1="00000000000000000000000000"', BASES, "found '0000"),
@@ -120,3 +123,85 @@ def test_damaged_colours_are_refused_by_one_line(triangle, resources, expected):
     assert expected in str(caught.value)
     assert "\n" not in str(caught.value)
     assert len(wive.load_mesh(file([triangle], resources=resources))[1]) == 1
+
+
+QUARTERS = np.array([[[255, 0, 0], [0, 255, 0]], [[0, 0, 255], [255, 255, 255]]], np.uint8)
+# Around the middle of red, at the upper left, and of white, at the lower right; up is positive.
+PLACES = [(0.2, 0.7), (0.3, 0.7), (0.2, 0.8), (0.7, 0.2), (0.8, 0.2), (0.7, 0.3)]
+ON_TEXTURE = ['pid="8" p1="0" p2="1" p3="2"', 'pid="8" p1="3" p2="4" p3="5"']
+
+
+def textured(
+    triangles=ON_TEXTURE, style="", path="/3D/Textures/t.png", member="3D__Textures__t.png", shift=0.0
+) -> bytes:
+    """A package of a square on a texture."""
+    image = pytest.importorskip("PIL.Image")
+    picture = io.BytesIO()
+    image.fromarray(QUARTERS).save(picture, "PNG")
+    places = "".join(f'<m:tex2coord u="{u + shift}" v="{v}"/>' for u, v in PLACES)
+    texture = f'<m:texture2d id="6" path="{path}" contenttype="image/png" {style}/>'
+    resources = f'{texture}<m:texture2dgroup id="8" texid="6">{places}</m:texture2dgroup>{BASES}'
+    whole = file(triangles, resources=resources)
+    with zipfile.ZipFile(io.BytesIO(whole)) as archive:
+        return package(archive.read("3D/3dmodel.model"), **{member: picture.getvalue()})
+
+
+def test_textures_are_means_over_triangles():
+    found = wive.load_colors(textured())
+    np.testing.assert_allclose(found[:, 0], [RED, [0.8] * 3], rtol=1e-6)
+    found = wive.load_colors(textured(['pid="5" p1="1"', *ON_TEXTURE]))
+    np.testing.assert_allclose(found[:, 0], [BLUE, RED, [0.8] * 3], rtol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("style", "expected"),
+    [
+        ("", [RED, [0.8] * 3]),
+        ('tilestyleu="wrap"', [RED, [0.8] * 3]),
+        ('tilestyleu="clamp"', [GREEN, [0.8] * 3]),
+        ('tilestyleu="mirror"', [GREEN, BLUE]),
+        ('tilestylev="mirror"', [RED, [0.8] * 3]),
+    ],
+)
+def test_what_is_beyond_a_texture_is_as_its_style_says(style, expected):
+    np.testing.assert_allclose(wive.load_colors(textured(style=style, shift=1))[:, 0], expected, rtol=1e-6)
+
+
+@pytest.mark.parametrize("path", ["/3D/none.png", "../t.png", "/etc/passwd", "", "/3D/3dmodel.model"])
+def test_a_texture_that_is_missing_or_no_picture_has_no_colour(path):
+    assert wive.load_colors(textured(path=path)) is None
+    found = wive.load_colors(textured(['pid="5" p1="1"', *ON_TEXTURE], path=path))
+    np.testing.assert_allclose(found[:, 0], [BLUE, NONE, NONE], rtol=1e-6)
+
+
+def test_a_texture_that_is_damaged_has_no_colour():
+    data = bytearray(textured())
+    at = data.index(b"3D/Textures/t.png") + len(b"3D/Textures/t.png")
+    data[at + 30] ^= 0xFF  # in the picture's bytes, of which the archive has a checksum
+    assert wive.load_colors(bytes(data)) is None
+
+
+def test_a_texture_that_is_too_long_has_no_colour(monkeypatch):
+    monkeypatch.setattr("wive._internal.formats.threemf.reader.LONGEST_PICTURE", 10)
+    assert wive.load_colors(textured()) is None
+
+
+@pytest.mark.parametrize(
+    ("shift", "triangle", "expected"),
+    [
+        ("x", ON_TEXTURE[0], "could not convert string to float"),
+        (np.nan, ON_TEXTURE[0], "tex2coord: expected finite numbers, found 'nan'"),
+        (0, 'pid="8" p1="6"', "group '8': expected an index below 6, found '6'"),
+    ],
+)
+def test_damaged_places_on_textures_are_one_line(shift, triangle, expected):
+    if shift == "x":
+        data = textured()
+        with zipfile.ZipFile(io.BytesIO(data)) as archive:
+            data = package(archive.read("3D/3dmodel.model").replace(b'u="0.2"', b'u="x"'))
+    else:
+        data = textured([triangle], shift=shift)
+    with pytest.raises(ValueError, match=r"^mesh \(bytes\): ") as caught:
+        wive.load_colors(data)
+    assert expected in str(caught.value)
+    assert "\n" not in str(caught.value)

@@ -165,7 +165,8 @@ SAMPLER = (
     '<newparam sid="surface"><surface type="2D"><init_from>image</init_from></surface></newparam>'
     '<newparam sid="sampler"><sampler2D><source>surface</source></sampler2D></newparam>'
 )
-NEWER = '<newparam sid="sampler"><sampler2D><instance_image url="#image"/><wrap_s>CLAMP</wrap_s></sampler2D></newparam>'
+INSTANCE = '<instance_image url="#image"/><wrap_s>CLAMP</wrap_s>'
+NEWER = f'<newparam sid="sampler"><sampler2D>{INSTANCE}</sampler2D></newparam>'
 FILE = '<image id="image"><init_from>my%20pictures/t.png</init_from></image>'
 
 

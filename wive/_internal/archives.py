@@ -39,3 +39,7 @@ class Archive:
     def packed_size(self, name: str) -> int:
         """The number of bytes of a member in the archive."""
         return self._members[name].compress_size
+
+    def size(self, name: str) -> int:
+        """The number of bytes that a member claims to unpack to."""
+        return self._members[name].file_size

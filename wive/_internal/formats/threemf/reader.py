@@ -23,6 +23,7 @@ CHUNK = 1 << 16
 # A mesh's text packs to a fifth or a tenth of its length. What is long and packs to less than a hundredth is
 # made to keep a reader busy.
 LONG, MOST_PACKED = 1 << 30, 100
+LONGEST_PICTURE = 1 << 28
 PartKind = TypeVar("PartKind", bound=Part)
 
 
@@ -56,6 +57,16 @@ class Package(Generic[PartKind]):
         if name not in self._parts:
             self._parts[name] = self._kind(self._chunks(name), self._names[name])
         return self._parts[name]
+
+    def picture(self, path: str) -> bytes | None:
+        """The bytes of another member; None if there is none at this path, if it is damaged or too long."""
+        name = path.lstrip("/").lower()
+        if name not in self._names or self._archive.size(self._names[name]) > LONGEST_PICTURE:
+            return None
+        try:
+            return b"".join(self._chunks(name))
+        except ValueError:
+            return None
 
     def _root(self) -> str:
         if "_rels/.rels" in self._names:
