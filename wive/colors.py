@@ -24,8 +24,8 @@ def load_colors(source: MeshSource, *, file_type: str | None = None) -> NDArray[
 
     PLY and OFF: of vertices or faces. OBJ: of vertices, else diffuse colours and textures of materials. glTF
     and COLLADA: base or diffuse colours and textures, times vertex colours. 3MF: base materials, colour
-    groups and textures. Binary STL: of facets. Pillow reads textures, which give each triangle their mean over
-    it; one that can't be read leaves the material's colour. docs/mesh_files.md has the rules.
+    groups and textures. Binary STL: of facets. Pillow reads textures, which give each triangle their mean;
+    one that can't be read leaves the material's colour. docs/mesh_files.md has the rules.
 
     Arguments:
         source, file_type: as `load_mesh` takes them.

@@ -6,6 +6,7 @@ import zipfile
 import numpy as np
 import pytest
 from support import threemf_files
+from support.damaged_colours import check_damaged
 from support.threemf_files import components, package
 
 import wive
@@ -205,3 +206,9 @@ def test_damaged_places_on_textures_are_one_line(shift, triangle, expected):
         wive.load_colors(data)
     assert expected in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def test_damaged_files_have_colours_that_fit_or_are_one_line():
+    with zipfile.ZipFile(io.BytesIO(textured(['pid="9" p1="0" p2="1" p3="2"', *ON_TEXTURE]))) as archive:
+        part, picture = archive.read("3D/3dmodel.model"), archive.read("3D/Textures/t.png")
+    check_damaged(part, "3mf", 11, lambda data: package(data, **{"3D__Textures__t.png": picture}))

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from support.dae_files import document, geometry, node, primitive, source
+from support.damaged_colours import check_damaged
 
 import wive
 
@@ -255,3 +256,9 @@ def test_damaged_texture_coordinates_are_one_line(tmp_path):
         ValueError, match=r"m\.dae: line 3: triangles: has the index 5 for 5 places on a texture"
     ):
         wive.load_colors(textured(tmp_path, places=PLACES[:5]))
+
+
+def test_damaged_files_have_colours_that_fit_or_are_one_line():
+    nodes = node(draw("g", a="#m-red", b="#m-half"))
+    check_damaged(coloured(SQUARE, nodes, EFFECTS), "dae", 12)
+    check_damaged(coloured(with_colours("corners", "1 0 0, 0 1 0, 0 0 1"), nodes, EFFECTS), "dae", 13)

@@ -4,6 +4,7 @@ import struct
 
 import numpy as np
 import pytest
+from support.damaged_colours import check_damaged
 from support.mesh_files import STL_TEXT
 
 import wive
@@ -65,3 +66,8 @@ def test_all_levels_of_a_colour_are_read():
     np.testing.assert_allclose(found[:, 0], expected, rtol=1e-6)
     found = colours(attributes, b"COLOR=1234")
     np.testing.assert_allclose(found[:, 0], expected[:, ::-1], rtol=1e-6)
+
+
+def test_damaged_files_have_colours_that_fit_or_are_one_line():
+    check_damaged(stl([31, 0x8001, 0], b"COLOR=1234"), "stl", 14)
+    check_damaged(stl([31, 0x8001, 0]), "stl", 15)

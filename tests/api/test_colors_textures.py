@@ -7,7 +7,9 @@ import sys
 
 import numpy as np
 import pytest
+from support.damaged_colours import check_damaged
 from support.gltf_files import Model, primitive
+from support.mesh_files import damaged
 
 import wive
 from wive._internal.formats.colours import linear, texture_mean
@@ -445,3 +447,19 @@ def test_a_model_of_json_names_its_textures(tmp_path):
     (tmp_path / "t.png").write_bytes(file(QUARTERS))
     (tmp_path / "m.gltf").write_text(json.dumps(model.json))
     np.testing.assert_allclose(wive.load_colors(tmp_path / "m.gltf")[:, 0], EXPECTED, rtol=1e-6)
+
+
+def test_damaged_files_have_colours_that_fit_or_are_one_line(tmp_path):
+    turned = {"extensions": {"KHR_texture_transform": {"offset": [0, 1], "rotation": 1.5, "scale": [2, 1]}}}
+    model = gltf(middles(), file(QUARTERS), base=turned, sampler={"wrapS": 33071}, texture={"sampler": 0})
+    check_damaged(model.glb(), "glb", 16)
+    random = np.random.default_rng(17)
+    path = obj(
+        tmp_path, "f 1/1 2/2 3/3\nf -5/10 -4/11 -3/12 1/1\n", "Kd 1 1 1\nmap_Kd -s 1 2 -clamp on t.png\n"
+    )
+    for name in ("m.mtl", "t.png") * 100:  # other files never stop the mesh's
+        whole = (tmp_path / name).read_bytes()
+        (tmp_path / name).write_bytes(damaged(whole, random))
+        colours = wive.load_colors(path)
+        assert colours is None or colours.shape == (3, 1, 3)
+        (tmp_path / name).write_bytes(whole)
