@@ -13,6 +13,7 @@ BENCHES = {
     "dask": "wive.dask on threads and two processes against one call of the scene",
     "embree": "single rays against native Embree: speed, build time, SAH, memory",
     "gpu": "wive's Warp kernels on a GPU: the core's bits, speed against Warp's own query, streams",
+    "gpu_model": "what a GPU's warps would do in wive's kernels and Warp's query, without one",
     "inflight": "speed and latency over the rays in flight, and what memory's latency allows",
     "latency": "seconds per call over batch sizes: every backend, wp.mesh_query_ray, embreex",
     "moving": "one mesh that moves in a scene: refit(geom=), refit, a new scene, a second scene",

@@ -11,11 +11,11 @@ import pytest
 wp = pytest.importorskip("warp")
 
 from support.meshes import random_rays, soup
-from support.ptx import HostKernel, MachineError, on_the_host
-from support.ptx.instructions import rule_of
-from support.ptx.launching import COMPILER, ptx_of
 from support.warp_launches import INFINITE, ZERO
 
+from bench.ptx import HostKernel, MachineError, on_the_host
+from bench.ptx.instructions import rule_of
+from bench.ptx.launching import COMPILER, ptx_of
 from wive import _cpu, warp_kernels
 from wive.warp_kernels.launching.kernels import make_kernel
 from wive.warp_kernels.launching.launch import default_block_dim

@@ -11,10 +11,10 @@ wp = pytest.importorskip("warp")
 
 from support.hard_rays import HARD_MESHES, hard_rays
 from support.meshes import random_rays
-from support.ptx import on_the_host
-from support.ptx.launching import COMPILER
 from support.warp_launches import INFINITE, Answers, assert_bit_identical, cpu_answers, warp_answers
 
+from bench.ptx import on_the_host
+from bench.ptx.launching import COMPILER
 from wive import _cpu, warp_kernels
 from wive.warp_kernels.lanes.precision import PRECISIONS
 

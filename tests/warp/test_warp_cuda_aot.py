@@ -17,8 +17,7 @@ import pytest
 
 wp = pytest.importorskip("warp")
 
-from support.ptx.launching import ptx_of
-
+from bench.ptx.launching import ptx_of
 from wive.warp_kernels.launching import sorting
 from wive.warp_kernels.launching.kernels import make_kernel
 from wive.warp_kernels.launching.launch import MOST_CUDA_THREADS, default_block_dim

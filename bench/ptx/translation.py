@@ -4,8 +4,9 @@ import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
-from support.ptx.instructions import SIZES, TYPES, rule_of
-from support.ptx.parsing import (
+from bench.ptx.blocks import Block, blocks_of
+from bench.ptx.instructions import SIZES, TYPES, rule_of
+from bench.ptx.parsing import (
     Brace,
     Declaration,
     Function,
@@ -37,18 +38,22 @@ class Program:
 
     text: str
     shared_bytes: int
+    blocks: list[Block]
 
 
-def translate(ptx: str, kernel: str) -> Program:
-    """The program of one kernel in PTX text."""
+def translate(ptx: str, kernel: str, *, traced: bool = False) -> Program:
+    """The program of one kernel in PTX text; if traced, it tells the model its blocks and accesses."""
     functions = [one for one in functions_of(ptx) if not one.is_kernel or one.name == kernel]
+    blocks, begins = blocks_of(functions)
     names = {function.name: f"function_{i}" for i, function in enumerate(functions)}
     shared = _Shared()
+    for match in re.finditer(rf"^(?:\.\w+ +)*\.{MEMORY.pattern};", ptx, re.MULTILINE):
+        shared.declare(match)
     heads, bodies = [], []
-    for function in functions:
+    for function, starts in zip(functions, begins, strict=True):
         parameters = ", ".join(f"unsigned char* {_identifier(name)}" for name in function.parameters)
         head = f"static void {names[function.name]}({parameters})"
-        body = _Body(names, shared).lines(function)
+        body = _Body(names, shared, starts if traced else None).lines(function)
         heads.append(f"{head};")
         bodies.append("\n".join([f"{head} {{", *body, "}"]))
     (entry,) = (function for function in functions if function.is_kernel)
@@ -62,7 +67,7 @@ def translate(ptx: str, kernel: str) -> Program:
             f'extern "C" void ptx_entry(const unsigned char* const* given) {{ {names[kernel]}({given}); }}',
         ]
     )
-    return Program(text, shared.bytes)
+    return Program(text, shared.bytes, blocks)
 
 
 @dataclass
@@ -72,20 +77,28 @@ class _Shared:
     offsets: dict[str, int] = field(default_factory=dict)
     bytes: int = 0
 
-    def add(self, name: str, size: int, align: int) -> None:
-        self.offsets[name] = -(-self.bytes // align) * align
-        self.bytes = self.offsets[name] + size
+    def declare(self, match: re.Match[str]) -> None:
+        """Adds the variable of a declaration, which a match of MEMORY gives."""
+        unit = SIZES[match["kind"]]
+        align = int(match["align"] or unit)
+        self.offsets[match["name"]] = -(-self.bytes // align) * align
+        self.bytes = self.offsets[match["name"]] + unit * int(match["count"] or 1)
 
 
 @dataclass(frozen=True)
 class _Body:
-    """Translates the statements of one function."""
+    """Translates the statements of one function; `starts` are those at which the blocks to be told begin."""
 
     functions: Mapping[str, str]
     shared: _Shared
+    starts: Mapping[int, int] | None
 
     def lines(self, function: Function) -> Iterable[str]:
-        return (self._statement(statement) for statement in function.body)
+        for at, statement in enumerate(function.body):
+            done = self._statement(statement)
+            told = f"step({self.starts[at]});" if self.starts is not None and at in self.starts else ""
+            # A label comes before what belongs to its block.
+            yield f"{done} {told}" if isinstance(statement, Label) else f"{told} {done}"
 
     def _statement(self, statement: Statement) -> str:
         if isinstance(statement, Brace):
@@ -109,10 +122,9 @@ class _Body:
         match = MEMORY.fullmatch(text)
         if match is None:
             raise ValueError(f"PTX: unknown declaration .{text}")
-        unit = SIZES[match["kind"]]
-        size = unit * int(match["count"] or 1)
+        size = SIZES[match["kind"]] * int(match["count"] or 1)
         if match["space"] == "shared":
-            self.shared.add(match["name"], size, int(match["align"] or unit))
+            self.shared.declare(match)
             return ""
         return f"alignas(16) unsigned char {_identifier(match['name'])}[{size}];"
 
@@ -157,6 +169,8 @@ class _Body:
         names = split_operands(values[1:-1]) if values.startswith("{") else (values,)
         size = SIZES[kind]
         done = [f"unsigned char* const at = aligned({self._address(place, opcode)}, {size * len(names)});"]
+        if self.starts is not None and ".param" not in opcode:
+            done.append(f"access({'false' if loads else 'true'}, at, {size * len(names)});")
         for i, name in enumerate(names):
             if loads:
                 done.append(_assigned(name, kind, f"load<{TYPES[kind]}>(at + {size * i})"))

@@ -16,6 +16,6 @@ These are errors:
 Not covered: the assembler behind PTX, memory orders weaker than one access at a time, races between warps.
 """
 
-from support.ptx.launching import HostKernel, MachineError, host_kernel, on_the_host
+from bench.ptx.launching import HostKernel, MachineError, host_kernel, on_the_host
 
 __all__ = ["HostKernel", "MachineError", "host_kernel", "on_the_host"]

@@ -238,10 +238,12 @@ void check_shared(std::size_t at, std::size_t bytes, Access access) {
     }
 }
 
-// Runs a grid of blocks, one after another. Returns whether nothing failed; else `error` says what did.
-extern "C" bool ptx_launch(void (*entry)(const unsigned char* const*), const unsigned char* const* parameters,
-                           std::uint32_t blocks, std::uint32_t threads, std::size_t shared_bytes, std::uint64_t seed,
-                           char* error, std::size_t error_bytes) {
+// Runs a grid of blocks, one after another, and calls `warp_ended()` after each warp. If something fails `error` says
+// what did.
+template <class Function>
+void run_grid(void (*entry)(const unsigned char* const*), const unsigned char* const* parameters, std::uint32_t blocks,
+              std::uint32_t threads, std::size_t shared_bytes, std::uint64_t seed, char* error,
+              std::size_t error_bytes, Function warp_ended) {
     // What shared memory holds at first is undefined.
     std::vector<std::uint64_t> shared(shared_bytes / 8 + 1, 0xC5C5C5C5C5C5C5C5u);
     block = {reinterpret_cast<unsigned char*>(shared.data()), shared_bytes, 0, blocks, threads};
@@ -256,7 +258,15 @@ extern "C" bool ptx_launch(void (*entry)(const unsigned char* const*), const uns
         for (std::uint32_t first = 0; first < threads && error[0] == 0; first += WARP) {
             begin_warp(first);
             run_warp();
+            warp_ended();
         }
+}
+
+// Returns whether nothing failed; else `error` says what did.
+extern "C" bool ptx_launch(void (*entry)(const unsigned char* const*), const unsigned char* const* parameters,
+                           std::uint32_t blocks, std::uint32_t threads, std::size_t shared_bytes, std::uint64_t seed,
+                           char* error, std::size_t error_bytes) {
+    run_grid(entry, parameters, blocks, threads, shared_bytes, seed, error, error_bytes, [] {});
     return error[0] == 0;
 }
 

@@ -54,6 +54,10 @@ std::uint32_t meet(Operation operation, const char* site, std::uint32_t mask, st
 // Before an access to shared memory another thread may run.
 void let_others_run();
 
+// What programs that are translated with their blocks tell the model: which block begins, and each access.
+void step(std::int32_t block);
+void access(bool writes, const unsigned char* address, std::uint32_t bytes);
+
 // Checks an access to shared memory for races. Threads may write the same value to a word at once.
 enum class Access { read, change, write_same };
 void check_shared(std::size_t at, std::size_t bytes, Access access);

@@ -16,7 +16,7 @@ import warp as wp
 from warp._src.context import pack_arg
 from warp._src.types import launch_bounds_t
 
-from support.ptx.translation import translate
+from bench.ptx.translation import translate
 
 HERE = Path(__file__).parent
 COMPILER = shlex.split(os.environ.get("CXX", "c++"))
@@ -30,22 +30,22 @@ class MachineError(RuntimeError):
     """Threads of a launch did what CUDA does not allow."""
 
 
-def build(text: str) -> ctypes.CDLL:
+def build(text: str, *flags: str) -> ctypes.CDLL:
     """The shared library of C++ text; those built later may use its functions."""
     with tempfile.TemporaryDirectory(prefix="ptx") as folder:
         source, library = Path(folder) / "program.cpp", Path(folder) / "program.so"
         source.write_text(text)
-        command = [*COMPILER, *FLAGS, f"-I{HERE}", "-o", str(library), str(source)]
-        subprocess.run(command, check=True, timeout=120)
+        command = [*COMPILER, *FLAGS, *flags, f"-I{HERE}", "-o", str(library), str(source)]
+        subprocess.run(command, check=True, timeout=300)
         return ctypes.CDLL(str(library), mode=ctypes.RTLD_GLOBAL)
 
 
 @functools.cache
 def machine() -> Any:
-    """The function that runs grids of blocks."""
-    launch = build('#include "machine.cpp"').ptx_launch
-    launch.restype = ctypes.c_bool
-    return launch
+    """The library that runs grids of blocks, and models them."""
+    library = build('#include "machine.cpp"\n#include "model.cpp"', "-O2")
+    library.ptx_launch.restype = library.ptx_model.restype = ctypes.c_bool
+    return library
 
 
 @functools.cache
@@ -62,6 +62,7 @@ class HostKernel:
     """A kernel whose PTX was built for the host."""
 
     def __init__(self, ptx: str, name: str) -> None:
+        """Build the kernel of that name in PTX text."""
         machine()
         program = translate(ptx, name)
         self._entry = ctypes.cast(build(program.text).ptx_entry, ctypes.c_void_p)
@@ -75,7 +76,7 @@ class HostKernel:
         pointers = (ctypes.c_void_p * len(arguments))(*map(ctypes.addressof, arguments))
         shared, random = ctypes.c_size_t(self._shared_bytes), ctypes.c_uint64(seed)
         error, size = ctypes.create_string_buffer(ERROR_BYTES), ctypes.c_size_t(ERROR_BYTES)
-        if not machine()(self._entry, pointers, blocks, block_dim, shared, random, error, size):
+        if not machine().ptx_launch(self._entry, pointers, blocks, block_dim, shared, random, error, size):
             raise MachineError(error.value.decode())
 
 
