@@ -20,7 +20,6 @@ from bench.support.report import Row
 from bench.support.scenes import Mesh, SceneFolder
 
 SCENES = ("living_room", "terrain_jacksboro", "bathroom_salledebain")
-BUILDERS = ("sah", "cubql")  # of Warp's trees
 NODES: tuple[Literal["float32", "compressed"], ...] = ("float32", "compressed")
 RAYS, QUICK_RAYS = 4096, 1024
 RUN = 256  # rays that are neighbours in the recorded sets
@@ -64,7 +63,7 @@ def rows_of(mesh: Mesh, rays: Rays, lanes: Sequence[Literal[1, 8]]) -> Iterator[
     import warp as wp
 
     import wive
-    from bench.contenders.mesh_query_ray import MeshQuery
+    from bench.contenders.mesh_query_ray import BUILDERS, MeshQuery
     from wive.warp_kernels import launch_closest
 
     count = len(rays)
@@ -121,6 +120,8 @@ def counted(kernel: str, work: Callable[[], None], prims: Any, truth: Any) -> Ro
 
 def add_ratios(rows: Sequence[Row]) -> None:
     """Adds to wive's rows what each of Warp's trees needs over what wive needs."""
+    from bench.contenders.mesh_query_ray import BUILDERS
+
     by_kernel = {row["kernel"]: row for row in rows}
     for row in rows:
         for builder in BUILDERS:

@@ -3,8 +3,9 @@
 `curve`: closest hits of 1, 4, 16, ... rays per call, from arrays on the contender's device; a call ends when
 its hits are written. p50 and p99 are quantiles of the calls' wall-clock seconds, Python's overhead included;
 with few calls p99 is the longest. CPU backends use --threads threads, by default 1 like Warp's CPU device and
-embreex; all then run on one core. `compare`: seconds of wp.mesh_query_ray over those of wive's Warp kernels
-on the same rays, launched in turn on arrays made before: above 1 wive is faster.
+embreex; all then run on one core. `compare`: seconds of wp.mesh_query_ray, with its trees by SAH and by
+cuBQL, over those of wive's Warp kernels on the same rays, launched in turn on arrays made before: above 1
+wive is faster.
 """
 
 import argparse
@@ -39,10 +40,10 @@ VARIANTS = 16
 
 CURVE_COLUMNS = ["scene", "rays", "contender", "device", "batch", "p50_us", "p99_us", "mrays", "calls"]
 COMPARE_COLUMNS = [
-    "scene", "triangles", "rays", "accuracy", "lanes", "device", "count", "ratio", "low", "high",
+    "scene", "triangles", "rays", "accuracy", "lanes", "builder", "device", "count", "ratio", "low", "high",
     "wive_mrays", "mesh_query_ray_mrays", "rounds", "mismatches",
 ]  # fmt: skip
-MEAN_COLUMNS = ["rays", "accuracy", "lanes", "mean", "lowest"]
+MEAN_COLUMNS = ["rays", "accuracy", "lanes", "builder", "mean", "lowest"]
 
 
 def main(options: Sequence[str]) -> None:
@@ -74,7 +75,7 @@ def main(options: Sequence[str]) -> None:
             sets = [recorded[kind].thinned(most) for kind in COMPARED_KINDS]
             for row in compare_rows(mesh, device, lanes, sets, effort):
                 comparison.append(row)
-                report.print_progress(row, ("scene", "rays", "accuracy", "lanes", "ratio"))
+                report.print_progress(row, ("scene", "rays", "accuracy", "lanes", "builder", "ratio"))
         means = mean_rows(comparison)
     report.print_table(curve, CURVE_COLUMNS, "Latency per call in microseconds, and Mray/s at the median")
     report.print_table(comparison, COMPARE_COLUMNS, "wp.mesh_query_ray's seconds over wive's on Warp")

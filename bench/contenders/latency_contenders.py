@@ -1,5 +1,6 @@
 """The contenders of `bench latency`: every backend and lane form, Warp's own query, embreex."""
 
+import functools
 import importlib.util
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -40,7 +41,10 @@ def contenders(
     if wive.backends()["warp"].usable:
         for form in lanes:
             makers[f"warp L={form}"] = lambda form=form: _warp(mesh, device, form)  # type: ignore[misc]
-        makers["mesh_query_ray"] = lambda: _mesh_query_ray(mesh, device)
+        from bench.contenders.mesh_query_ray import BUILDERS
+
+        for builder in BUILDERS:
+            makers[f"mesh_query_ray {builder}"] = functools.partial(_mesh_query_ray, mesh, device, builder)
     if importlib.util.find_spec("embreex"):
         makers["embreex"] = lambda: _embreex(mesh)
     for name, make in makers.items():
@@ -74,12 +78,12 @@ def _warp(mesh: Mesh, device: str, lanes: LaneForm) -> Contender:
     return Contender(f"warp L={lanes}", device, prepare)
 
 
-def _mesh_query_ray(mesh: Mesh, device: str) -> Contender:
+def _mesh_query_ray(mesh: Mesh, device: str, builder: str) -> Contender:
     import warp as wp
 
     from bench.contenders.mesh_query_ray import MeshQuery
 
-    query = MeshQuery(mesh, device)
+    query = MeshQuery(mesh, device, builder)
 
     def prepare(origins: Array, directions: Array) -> Call:
         starts = wp.array(origins, dtype=wp.vec3, device=device)
@@ -91,7 +95,7 @@ def _mesh_query_ray(mesh: Mesh, device: str) -> Contender:
 
         return call
 
-    return Contender("mesh_query_ray", device, prepare)
+    return Contender(f"mesh_query_ray {builder}", device, prepare)
 
 
 def _embreex(mesh: Mesh) -> Contender:

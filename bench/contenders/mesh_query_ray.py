@@ -10,6 +10,7 @@ from bench.support.scenes import Mesh
 
 wp.set_module_options({"enable_backward": False})
 
+BUILDERS = ("sah", "cubql")  # the trees that trace fastest
 BLOCK = 256  # threads per block, Warp's default
 
 
@@ -18,7 +19,7 @@ class MeshQuery:
 
     def __init__(self, mesh: Mesh, device: str, builder: str = "sah") -> None:
         """Builds by the surface-area heuristic: Warp's default on CUDA builds faster and traces slower."""
-        self.device = device
+        self.device, self.builder = device, builder
         self.mesh = wp.Mesh(
             points=wp.array(mesh.vertices, dtype=wp.vec3, device=device),
             indices=wp.array(mesh.faces.ravel(), dtype=wp.int32, device=device),

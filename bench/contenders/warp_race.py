@@ -8,7 +8,7 @@ import numpy as np
 import warp as wp
 
 import wive
-from bench.contenders.mesh_query_ray import MeshQuery
+from bench.contenders.mesh_query_ray import BUILDERS, MeshQuery
 from bench.support.rays import Rays
 from bench.support.report import Row
 from bench.support.scenes import Mesh
@@ -22,18 +22,19 @@ ACCURACIES: tuple[Accuracy, ...] = ("fast", "watertight")
 def compare_rows(
     mesh: Mesh, device: str, lanes: Sequence[Literal[1, 8]], sets: Sequence[Rays], effort: Effort
 ) -> Iterator[Row]:
-    """One row per accuracy, lane form and set of rays."""
-    theirs = MeshQuery(mesh, device)
+    """One row per accuracy, lane form, set of rays and tree of Warp's."""
+    queries = [MeshQuery(mesh, device, builder) for builder in BUILDERS]
     for accuracy in ACCURACIES:
         scene = wive.Scene(mesh.vertices, mesh.faces, device=device, accuracy=accuracy)
         for form in lanes:
             for rays in sets:
-                yield _row(mesh, scene, theirs, form, rays, effort)
+                for theirs in queries:
+                    yield _row(mesh, scene, theirs, form, rays, effort)
 
 
 def mean_rows(rows: Sequence[Row]) -> list[Row]:
-    """Geometric mean and lowest ratio over scenes, per kind of rays, accuracy and lane form."""
-    keys = ("rays", "accuracy", "lanes")
+    """Geometric mean and lowest ratio over scenes, per kind of rays, accuracy, lane form and builder."""
+    keys = ("rays", "accuracy", "lanes", "builder")
     means = []
     for key in dict.fromkeys(tuple(row[name] for name in keys) for row in rows):
         ratios = [row["ratio"] for row in rows if tuple(row[name] for name in keys) == key]
@@ -66,6 +67,7 @@ def _row(
         "rays": rays.kind,
         "accuracy": scene.accuracy,
         "lanes": lanes,
+        "builder": theirs.builder,
         "device": device,
         "count": count,
         "ratio": outcome.ratio,
