@@ -13,6 +13,9 @@ These are errors:
 - a load or store that is not aligned;
 - an instruction that is not known here, such as one that rounds otherwise.
 
+The tests run kernels in this way. `python -m bench gpu_model` counts what their warps do (blocks.py,
+model.py, model.cpp).
+
 Not covered: the assembler behind PTX, memory orders weaker than one access at a time, races between warps.
 """
 

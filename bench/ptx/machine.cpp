@@ -33,7 +33,7 @@ struct Thread {
     // What it waits for, and what it gets.
     Operation operation;
     const char* site;
-    std::uint32_t mask, value, result;
+    std::uint32_t mask, value, source, result;
 };
 
 // Who wrote a word of shared memory last, and who read it when, each in that thread's own time; 0 is never.
@@ -92,20 +92,6 @@ void begin_warp(std::uint32_t first) {
     std::fill(machine.words.begin(), machine.words.end(), Word{});
 }
 
-std::uint32_t combine(Operation operation, std::uint32_t a, std::uint32_t b) {
-    switch (operation) {
-        case Operation::bit_or:
-            return a | b;
-        case Operation::minimum:
-            return std::min(a, b);
-        case Operation::sum:
-            return a + b;
-        case Operation::sync:
-            return 0;
-    }
-    return 0;
-}
-
 // The lanes that wait with this one, if all that its mask names do or have ended; else none.
 std::vector<unsigned> complete_group(const Thread& first) {
     std::vector<unsigned> group;
@@ -128,7 +114,7 @@ bool release() {
         const std::vector<unsigned> group = complete_group(first);
         if (group.empty()) continue;
         any = true;
-        std::uint32_t all = machine.threads[group[0]].value;
+        std::uint32_t all = 0;
         Clock known = machine.threads[group[0]].knows;
         for (const unsigned lane : group) {
             const Thread& thread = machine.threads[lane];
@@ -138,17 +124,24 @@ bool release() {
                               machine.threads[group[0]].site, thread.site);
                 return false;
             }
-            if (lane != group[0]) all = combine(thread.operation, all, thread.value);
+            if (thread.operation == Operation::shuffle && std::ranges::find(group, thread.source) == group.end()) {
+                std::snprintf(machine.error, machine.error_bytes,
+                              "lane %u shuffles with lane %u, which is not there: %s", lane, thread.source,
+                              thread.site);
+                return false;
+            }
+            all |= thread.value;
             for (unsigned i = 0; i < WARP; ++i) known[i] = std::max(known[i], thread.knows[i]);
         }
         for (const unsigned lane : group) {
             Thread& thread = machine.threads[lane];
-            // CUDA orders memory at bar.warp.sync only, not at redux.sync.
+            // CUDA orders memory at bar.warp.sync only, not at votes and shuffles.
             if (thread.operation == Operation::sync) {
                 thread.knows = known;
                 ++thread.knows[lane];
             }
-            thread.result = all;
+            const bool shuffles = thread.operation == Operation::shuffle;
+            thread.result = shuffles ? machine.threads[thread.source].value : all;
             thread.state = State::ready;
         }
     }
@@ -203,7 +196,10 @@ void fail(const char* format, ...) {
     std::abort();  // the scheduler never returns to a thread that failed
 }
 
-std::uint32_t meet(Operation operation, const char* site, std::uint32_t mask, std::uint32_t value) {
+std::uint32_t lane_index() { return machine.running; }
+
+std::uint32_t meet(Operation operation, const char* site, std::uint32_t mask, std::uint32_t value,
+                   std::uint32_t source) {
     Thread& thread = self();
     if (!(mask >> machine.running & 1u))
         fail("mask %08x does not name its own lane %u: %s", mask, machine.running, site);
@@ -211,6 +207,7 @@ std::uint32_t meet(Operation operation, const char* site, std::uint32_t mask, st
     thread.site = site;
     thread.mask = mask;
     thread.value = value;
+    thread.source = source;
     thread.state = State::waits;
     leave();
     return thread.result;
@@ -242,8 +239,8 @@ void check_shared(std::size_t at, std::size_t bytes, Access access) {
 // what did.
 template <class Function>
 void run_grid(void (*entry)(const unsigned char* const*), const unsigned char* const* parameters, std::uint32_t blocks,
-              std::uint32_t threads, std::size_t shared_bytes, std::uint64_t seed, char* error,
-              std::size_t error_bytes, Function warp_ended) {
+              std::uint32_t threads, std::size_t shared_bytes, std::uint64_t seed, char* error, std::size_t error_bytes,
+              Function warp_ended) {
     // What shared memory holds at first is undefined.
     std::vector<std::uint64_t> shared(shared_bytes / 8 + 1, 0xC5C5C5C5C5C5C5C5u);
     block = {reinterpret_cast<unsigned char*>(shared.data()), shared_bytes, 0, blocks, threads};

@@ -42,11 +42,29 @@ extern Block block;
 
 std::uint32_t thread_index();
 
-enum class Operation { sync, bit_or, minimum, sum };
+std::uint32_t lane_index();
 
-// The thread waits for all others in `mask` that have not ended; returns their values, combined. `site` is the
-// instruction, at which all of them have to meet.
-std::uint32_t meet(Operation operation, const char* site, std::uint32_t mask, std::uint32_t value = 0);
+enum class Operation { sync, ballot, shuffle };
+
+// The thread waits for all others in `mask` that have not ended. Returns the or of their values for a ballot, and for a
+// shuffle the value of the lane `source`. `site` is the instruction, at which all of them have to meet.
+std::uint32_t meet(Operation operation, const char* site, std::uint32_t mask, std::uint32_t value = 0,
+                   std::uint32_t source = 0);
+
+inline std::uint32_t ballot(const char* site, std::uint32_t mask, bool value) {
+    return meet(Operation::ballot, site, mask, std::uint32_t(value) << lane_index());
+}
+
+// The value of the lane whose number differs in the bits of `which`, or of that number; `limits` says within which
+// lanes, as PTX packs it.
+template <bool Butterfly>
+std::uint32_t shuffle(const char* site, std::uint32_t mask, std::uint32_t value, std::uint32_t which,
+                      std::uint32_t limits) {
+    const std::uint32_t lane = lane_index(), segment = limits >> 8 & 31u;
+    const std::uint32_t last = (lane & segment) | (limits & 31u & ~segment);
+    const std::uint32_t source = Butterfly ? lane ^ which : (lane & segment) | (which & ~segment);
+    return meet(Operation::shuffle, site, mask, value, source <= last ? source : lane);
+}
 
 // Stops the launch with this message.
 [[noreturn]] void fail(const char* format, ...);

@@ -1,5 +1,5 @@
-// Counts what the warps of a GPU would do: each thread's blocks and accesses are recorded while it runs as a fiber, then
-// the threads of a warp are replayed in step, and their accesses go through a model of an L1 cache.
+// Counts what the warps of a GPU would do: each thread's blocks and accesses are recorded while it runs as a fiber,
+// then the threads of a warp are replayed in step, and their accesses go through a model of an L1 cache.
 #include <bit>
 #include <list>
 #include <unordered_map>

@@ -5,7 +5,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 FUNCTION = re.compile(
-    r"\.(?P<kind>func|entry)\s*(?P<result>\([^)]*\))?\s*(?P<name>[\w$]+)\s*\((?P<parameters>[^)]*)\)\s*\{"
+    r"\.(?P<kind>func|entry)\s*(?P<result>\([^)]*\))?\s*(?P<name>[\w$]+)\s*\((?P<parameters>[^)]*)\)"
+    r"(?:\s*\.\w+ \d+)*\s*\{"
 )
 PARAMETER = re.compile(r"([\w$]+)(?:\[\d+\])?\s*$")
 INSTRUCTION = re.compile(r"(?:@(?P<not>!?)%(?P<guard>\w+)\s+)?(?P<opcode>\S+)\s*(?P<operands>.*)")

@@ -147,6 +147,7 @@ class _Body:
     def _computed(self, one: Instruction) -> str:
         rule, kind = rule_of(one.opcode)
         target, *given = one.operands
+        target = target.partition("|")[0]  # a shuffle's second result is not used here
         wanted = (operand or kind for operand in rule.operands)
         values = [self._operand(text, one_kind) for text, one_kind in zip(given, wanted, strict=False)]
         names = dict(zip("abcd", values, strict=False))

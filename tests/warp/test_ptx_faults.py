@@ -55,34 +55,36 @@ def without_sync(place: int) -> Callable[[str], str]:
     return changed
 
 
-def with_mask(of_group: int, shift: int) -> Callable[[str], str]:
-    """Replaces the mask of a ray's eight threads, 255 shifted by their first lane."""
+def with_operand(opcode: str, place: int, operand: str) -> Callable[[str], str]:
+    """Replaces an operand of every instruction of that opcode; the first is what it writes."""
 
     def changed(ptx: str) -> str:
-        found = re.search(r"and\.b32\s+(%r\d+), %r\d+, 24;\s+mov\.u32\s+(%r\d+), 255;", ptx)
-        assert found is not None
-        planted = found[0].replace(" 24;", f" {shift};").replace(" 255;", f" {of_group};")
-        return ptx.replace(found[0], planted)
+        def plant(instruction: re.Match[str]) -> str:
+            operands = instruction[2].split(", ")
+            operands[place] = operand
+            return instruction[1] + ", ".join(operands) + ";"
+
+        return re.sub(rf"({re.escape(opcode)}\s+)([^;]*);", plant, ptx)
 
     return changed
 
 
-@pytest.mark.parametrize("place", [1, -1])
+@pytest.mark.parametrize("place", range(4))
 def test_a_dropped_barrier_is_a_race(place: int) -> None:
-    """Behind the pushes of a node, and at the end of a step."""
+    """Before and behind the fetch of a ray, behind the pushes of a node, and at the end of a step."""
     with pytest.raises(MachineError, match=r"race: .* of shared memory"):
         trace(without_sync(place))
 
 
 def test_a_mask_of_other_threads_is_refused() -> None:
     with pytest.raises(MachineError, match="mask 000000ff does not name its own lane"):
-        trace(with_mask(255, 0))
+        trace(with_operand("vote.sync.ballot.b32", 2, "255"))
 
 
-def test_a_mask_of_all_threads_gives_wrong_hits() -> None:
-    """Nothing is wrong with how the threads meet, but four rays exchange their nodes."""
-    expected = _cpu.Bvh(*soup(3000, 1)).intersect("scalar", *RAYS, *LIMITS)[1]
-    assert (trace(with_mask(-1, 0)) != expected).any()
+def test_a_shuffle_between_rays_is_a_race() -> None:
+    """Threads that know another ray's distance take other children than the rest of their own."""
+    with pytest.raises(MachineError, match=r"race: .* of shared memory"):
+        trace(with_operand("shfl.sync.bfly.b32", 2, "8"))
 
 
 @pytest.mark.parametrize(

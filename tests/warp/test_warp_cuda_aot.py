@@ -1,7 +1,8 @@
 """The CUDA side without a GPU: every kernel is built ahead of time, and held to what the assembler says.
 
 Warp brings NVRTC, which compiles to PTX. Registers, stack and spills come from ptxas, which has to be as new
-as that NVRTC: `pip install nvidia-cuda-nvcc`, a CUDA toolkit, or WIVE_PTXAS=/path/to/ptxas.
+as that NVRTC: `pip install nvidia-cuda-nvcc`, a CUDA toolkit, or WIVE_PTXAS=/path/to/ptxas. Instructions come
+from nvdisasm: `pip install nvidia-cuda-nvdisasm`, or WIVE_NVDISASM=/path/to/nvdisasm.
 """
 
 import importlib.util
@@ -51,20 +52,20 @@ DOUBLE_BUILDS = [(query, 90, "watertight", "float32") for query in QUERIES] + [
 # Registers, measured with NVRTC and ptxas 13.5 and rounded up to a multiple of eight.
 REGISTERS = {
     ("fast", 8): 96,
-    ("watertight", 8): 112,
+    ("watertight", 8): 88,
     ("fast", 1): 72,
-    ("watertight", 1): 96,
+    ("watertight", 1): 72,
     ("exact", 8): 128,
-    ("exact", 1): 112,
+    ("exact", 1): 128,
 }
 # Compressed nodes need a few more, for unpacking.
 COMPRESSED_REGISTERS = {
     ("fast", 8): 96,
-    ("watertight", 8): 112,
-    ("fast", 1): 80,
-    ("watertight", 1): 96,
+    ("watertight", 8): 88,
+    ("fast", 1): 72,
+    ("watertight", 1): 72,
     ("exact", 8): 128,
-    ("exact", 1): 120,
+    ("exact", 1): 128,
 }
 # In float64 scenes, in either node form.
 DOUBLE_REGISTERS = {
@@ -74,14 +75,14 @@ DOUBLE_REGISTERS = {
     ("watertight", 1): 112,
 }
 # Bytes: a thread that owns its stack holds a child and, for the closest hit, a distance per entry, and up to
-# eleven words of the ray behind them. A group's stack is in shared memory.
+# 24 words of the ray behind them. A group's stack is in shared memory.
 STACK_BYTES = {
-    "closest": STACK * 8 + 48,
-    "any": STACK * 4 + 48,
-    "count": STACK * 4 + 48,
-    "all": STACK * 4 + 48,
+    "closest": STACK * 8 + 96,
+    "any": STACK * 4 + 96,
+    "count": STACK * 4 + 96,
+    "all": STACK * 4 + 96,
 }
-DOUBLE_STACK_BYTES = 32  # more: rays are kept in double
+DOUBLE_STACK_BYTES = 64  # more: rays are kept in double
 EXACT_STACK_BYTES = 9 * 1024  # integers of the exact test, of two triangles if hits are compared
 
 
@@ -100,16 +101,16 @@ class Usage:
     spills: int
 
 
-def find_ptxas() -> Iterator[Path]:
-    """Every ptxas there is to try, in the order of preference."""
-    if asked := os.environ.get("WIVE_PTXAS"):
+def find_tool(name: str) -> Iterator[Path]:
+    """Every program of CUDA's of that name there is to try, in the order of preference."""
+    if asked := os.environ.get(f"WIVE_{name.upper()}"):
         yield Path(asked)
     spec = importlib.util.find_spec("nvidia")
     for folder in (spec.submodule_search_locations if spec is not None else None) or []:
-        yield from sorted(Path(folder).glob("*/bin/ptxas"), reverse=True)
-    if on_path := shutil.which("ptxas"):
+        yield from sorted(Path(folder).glob(f"*/bin/{name}"), reverse=True)
+    if on_path := shutil.which(name):
         yield Path(on_path)
-    yield from sorted(Path("/usr/local").glob("cuda*/bin/ptxas"), reverse=True)
+    yield from sorted(Path("/usr/local").glob(f"cuda*/bin/{name}"), reverse=True)
 
 
 def assemble(ptx: str, architecture: int, folder: Path) -> Usage:
@@ -117,7 +118,7 @@ def assemble(ptx: str, architecture: int, folder: Path) -> Usage:
     source = folder / "kernel.ptx"
     source.write_text(ptx)
     tried = []
-    for ptxas in find_ptxas():
+    for ptxas in find_tool("ptxas"):
         command = [
             str(ptxas),
             "-v",
@@ -155,13 +156,33 @@ def test_kernel_compiles_for_cuda_within_its_limits(
     kernel = make_kernel(query, accuracy, lanes, STACK)
     ptx = ptx_of(kernel, default_block_dim(lanes), architecture)
     # The CUDA branches are what was compiled: the collectives of a group, wide loads of a thread.
-    assert ("redux.sync" in ptx) == (lanes == 1)
+    assert "vote.sync.ballot" in ptx
+    assert ("shfl.sync" in ptx) == (lanes == 1 and query in ("closest", "count"))
     assert ("ld.global.nc.v4" in ptx) == (lanes == 8)
     usage = assemble(ptx, architecture, tmp_path)
     assert usage.spills == 0
     assert usage.stack <= stack_limit(query, accuracy, lanes)
     assert usage.registers <= REGISTERS[accuracy, lanes]
     assert REGISTERS[accuracy, lanes] * MOST_CUDA_THREADS["float32"] <= BLOCK_REGISTERS
+
+
+@pytest.mark.timeout(120)
+@pytest.mark.parametrize("query", QUERIES)
+def test_threads_of_a_ray_talk_by_instructions_of_whole_warps(query: str, tmp_path: Path) -> None:
+    """A collective of some threads of a warp becomes a search for them, which takes five times as long."""
+    ptx = ptx_of(make_kernel(query, "watertight", 1, STACK), default_block_dim(1))
+    assert "redux" not in ptx and "match" not in ptx
+    assert set(re.findall(r"bar\.warp\.sync\s+([^;]+);", ptx)) == {"-1"}
+    assemble(ptx, 90, tmp_path)
+    nvdisasm = next(find_tool("nvdisasm"), None)
+    if nvdisasm is None:
+        pytest.skip("no nvdisasm: pip install nvidia-cuda-nvdisasm")
+    command = [str(nvdisasm), str(tmp_path / "kernel.cubin")]
+    run = subprocess.run(command, capture_output=True, text=True, timeout=120)
+    assert run.returncode == 0, run.stderr
+    opcodes = re.findall(r"/\*[0-9a-f]+\*/\s+(?:@!?U?P\w+\s+)?([A-Z][A-Z0-9]*)", run.stdout)
+    assert "VOTE" in opcodes and "LDG" in opcodes
+    assert not {"MATCH", "REDUX"} & set(opcodes)
 
 
 @pytest.mark.timeout(120)

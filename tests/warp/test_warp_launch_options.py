@@ -14,9 +14,16 @@ from support.meshes import random_rays, soup, sphere
 
 import wive
 from wive import _cpu, warp_kernels
-from wive.warp_kernels.lanes.lanes import collectives, lanes_of
+from wive.warp_kernels.lanes.lanes import lanes_of
+from wive.warp_kernels.lanes.warps import collectives, warp_of
 from wive.warp_kernels.launching.kernels import make_kernel
-from wive.warp_kernels.launching.launch import MOST_CUDA_THREADS, default_block_dim
+from wive.warp_kernels.launching.launch import (
+    MOST_CUDA_THREADS,
+    MOST_TURNS,
+    default_block_dim,
+    threads_of,
+    turns_of,
+)
 from wive.warp_kernels.scene.tracer import choose_lanes
 
 pytestmark = pytest.mark.timeout(60)
@@ -92,6 +99,7 @@ def test_queries_refuse_lanes_other_than_8_and_1(query: str, lanes: Any) -> None
 MADE_FOR_LANES = {
     "kernel": lambda lanes: make_kernel("closest", "watertight", lanes, 32),
     "collectives": collectives,
+    "warps": warp_of,
     "vectors": lambda lanes: lanes_of(lanes, 32, "float32"),
     "block size": default_block_dim,
     "choice": lambda lanes: choose_lanes(lanes, 1, False),
@@ -116,3 +124,19 @@ def test_lanes_and_block_sizes_may_be_numbers_of_numpy(number: type) -> None:
     tree = warp_kernels.upload(bvh, "cpu")
     warp_kernels.launch_closest(tree, *rays, *limits, t, prim, lanes=number(8), block_dim=number(64))
     np.testing.assert_array_equal(prim.numpy(), core[1])
+
+
+@pytest.mark.parametrize("lanes", [8, 1])
+@pytest.mark.parametrize("block_dim", [8, 24, 64, 96, 128, 512])
+def test_warps_of_a_launch_have_room_for_all_rays(lanes: Any, block_dim: int) -> None:
+    gpu = SimpleNamespace(is_cuda=True, sm_count=132)
+    for count in (1, 31, 33, 1000, 100_000, 1_000_003, 2**31 - 1):
+        for device in (gpu, wp.get_device("cpu")):
+            turns = turns_of(device, count)
+            threads = threads_of(count, turns, lanes, block_dim)
+            assert 1 <= turns <= MOST_TURNS and threads % block_dim == 0
+            warps = threads // block_dim * -(-block_dim // 32) if device is gpu else threads * lanes // 8
+            rays_at_once = 32 * lanes // 8 if device is gpu else 1
+            assert warps * rays_at_once * turns >= count
+    assert turns_of(gpu, 100_000) == 1  # rays are not made to wait while threads are idle
+    assert turns_of(gpu, 10_000_000) == MOST_TURNS

@@ -46,7 +46,7 @@ def make_functions(
     begin_closest, distance = closest.begin, closest.distance
     begin_any, begin_count = any_.begin, count.begin
     trace_closest, trace_any, trace_count = (
-        make_traversal(name, accuracy, 8, USERS_STACK, False, precision=precision)
+        make_traversal(name, accuracy, USERS_STACK, precision=precision)
         for name in ("closest", "any", "count")
     )
 
@@ -68,7 +68,7 @@ def make_functions(
         hit.normal = vec3(real(wp.nan))
         ray = load_frame(bvh.center, origin, direction, tmin, tmax)
         if ray.valid and not refused(bvh.error, bvh.kind, wanted):
-            best = trace_closest(bvh, ray, 0, begin_closest(ray)).found
+            best = trace_closest(bvh, ray, begin_closest(ray)).found
             if best.prim != NO_PRIM:
                 hit.t = distance(best, ray.unscale)
                 hit.u = best.u
@@ -89,7 +89,7 @@ def make_functions(
         ray = load_frame(bvh.center, origin, direction, tmin, tmax)
         hit = bool(False)
         if ray.valid and not refused(bvh.error, bvh.kind, wanted):
-            hit = trace_any(bvh, ray, 0, begin_any(ray)).found.prim != NO_PRIM
+            hit = trace_any(bvh, ray, begin_any(ray)).found.prim != NO_PRIM
         return hit
 
     @wp.func
@@ -101,7 +101,7 @@ def make_functions(
         ray = load_frame(bvh.center, origin, direction, tmin, tmax)
         hits = int(0)
         if ray.valid and not refused(bvh.error, bvh.kind, wanted):
-            hits = trace_count(bvh, ray, 0, begin_count(ray)).found.count
+            hits = trace_count(bvh, ray, begin_count(ray)).found.count
         return hits
 
     return closest_hit, any_hit, count_hits

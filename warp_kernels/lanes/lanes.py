@@ -5,36 +5,29 @@ The lane form says how the eight lanes of a node are spread over threads, and is
 - lanes=8: one thread per ray owns all eight lanes as vectors of length eight, and its stack is a local array.
 - lanes=1: eight threads per ray, a group, own one lane each. On CUDA they communicate by warp intrinsics and
   share a stack in shared memory. On Warp's CPU device they are fibers of a block, which run one at a time and
-  switch at barriers, so a static buffer between two barriers serves for both.
+  switch at barriers (warps.py).
 
 Code outside this folder is written once for both forms.
 """
 
 import functools
 from types import SimpleNamespace
-from typing import Literal
 
-import numpy as np
 import warp as wp
 
 from wive.warp_kernels.lanes.native import (
-    ADD_REDUCE,
     DISTANCES_1,
     DISTANCES_8,
     DOUBLE_TRIANGLES_4,
-    MIN_REDUCE,
-    OR_REDUCE,
     PRODUCT,
     PRODUCTS,
     ROUNDED_AS_WRITTEN,
     ROW_1,
     ROW_8,
-    SYNC,
     TRIANGLES_4,
     shared_stack_code,
 )
-
-Lanes = Literal[1, 8]
+from wive.warp_kernels.lanes.warps import collectives, expected_lanes
 
 
 @wp.func_native("""
@@ -103,48 +96,6 @@ def without_gradient(function: wp.Function) -> wp.Function:
     function.is_differentiable = False
     function.adj.skip_reverse_codegen = True
     return function
-
-
-@wp.func
-def _same(x: wp.uint32):
-    return x
-
-
-@wp.func_native(OR_REDUCE)
-def _or_of_group(x: wp.uint32) -> wp.uint32: ...
-
-
-@wp.func_native(MIN_REDUCE)
-def _min_of_group(x: wp.uint32) -> wp.uint32: ...
-
-
-@wp.func_native(ADD_REDUCE)
-def _sum_of_group(x: wp.uint32) -> wp.uint32: ...
-
-
-@wp.func
-def _nothing():
-    pass
-
-
-@wp.func_native(SYNC)
-def _sync_group(): ...
-
-
-def expected_lanes(lanes: object) -> Lanes:
-    """8 or 1; ValueError for all else."""
-    if isinstance(lanes, bool) or not isinstance(lanes, (int, np.integer)) or lanes not in (8, 1):
-        raise ValueError(f"lanes: expected 8 or 1, got {lanes!r}")
-    return 8 if lanes == 8 else 1
-
-
-def collectives(length: int) -> SimpleNamespace:
-    """The or, minimum and sum over the threads of a ray, each returned to all of them, and their barrier."""
-    if expected_lanes(length) == 8:
-        return SimpleNamespace(or_reduce=_same, min_reduce=_same, sum_reduce=_same, sync=_nothing)
-    return SimpleNamespace(
-        or_reduce=_or_of_group, min_reduce=_min_of_group, sum_reduce=_sum_of_group, sync=_sync_group
-    )
 
 
 @functools.cache

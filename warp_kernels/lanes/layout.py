@@ -10,16 +10,17 @@ UNIT_WORDS = 8
 WORD_MASK = 0x7FFFFFF8
 MAX_DEPTH = 64
 
-# A node: six rows of planes, the children, the ranks. `upload` turns the core's order row into ranks: lane i
-# holds its own place in each octant's order.
+# A node: six rows of planes, the children, the order. `upload` turns the core's order row, which has one word
+# per lane, into eight bytes per octant, for octants 0 to 3: the i-th byte has a bit for each slot that comes
+# behind slot i.
 NODE_WIDTH = 8
 NODE_WORDS = 8 * NODE_WIDTH
 CHILD_ROW = 6 * NODE_WIDTH
-RANK_ROW = 7 * NODE_WIDTH
-RANK_BITS = 4  # per octant
+BEHIND_ROW = 7 * NODE_WIDTH
+ORDER_BITS = 4  # per octant, in the core's order row
 
-# A compressed node: origin and step (three floats each), six rows of eight bytes, eight ranks of three bytes,
-# the children.
+# A compressed node: origin and step (three floats each), six rows of eight bytes, the order, the children.
+# `upload` turns the core's order into ranks: three bytes per lane with its place in each octant's order.
 COMPRESSED_NODE_WORDS = 32
 COMPRESSED_STEP = 3
 COMPRESSED_PLANES = 6

@@ -1,60 +1,9 @@
-"""Native code of the lane vectors and collectives: intrinsics on CUDA, plain C++ on Warp's CPU device.
+"""Native code of the lane vectors: intrinsics on CUDA, plain C++ on Warp's CPU device.
 
 Names that end in 8 or 4 are for lanes=8, one thread per ray; those in 1 for lanes=1, eight threads per ray.
 """
 
 from wive.warp_kernels.lanes.layout import COMPRESSED_PLANES, COMPRESSED_RANKS, COMPRESSED_STEP, NUMBER_BITS
-
-# Eight threads are one group, aligned within their warp.
-_GROUP_MASK = "const unsigned group = 0xffu << (threadIdx.x & 24u);"
-
-# Every fiber of the group writes its value, reads all eight after a barrier, and passes a second barrier
-# before the next write.
-_EXCHANGE = """
-    static unsigned values[WP_TILE_BLOCK_DIM];
-    const int thread = WP_TILE_THREAD_IDX;
-    values[thread] = x;
-    WP_TILE_SYNC();
-    unsigned all = values[thread & ~7];
-    for (int i = 1; i < 8; ++i) { const unsigned y = values[(thread & ~7) + i]; all = COMBINE; }
-    WP_TILE_SYNC();
-    return all;
-"""
-
-
-def _reduce(cuda: str, combine: str) -> str:
-    """Native code that reduces the unsigned x of a group: one CUDA instruction from sm_80 on."""
-    return f"""
-#if defined(__CUDA_ARCH__)
-    {_GROUP_MASK}
-#if __CUDA_ARCH__ >= 800
-    return {cuda}(group, x);
-#else
-    unsigned all = x;
-    for (int step = 4; step; step >>= 1) {{
-        const unsigned y = __shfl_xor_sync(group, all, step, 8);
-        all = {combine};
-    }}
-    return all;
-#endif
-#else
-    {_EXCHANGE.replace("COMBINE", combine)}
-#endif
-"""
-
-
-OR_REDUCE = _reduce("__reduce_or_sync", "all | y")
-MIN_REDUCE = _reduce("__reduce_min_sync", "y < all ? y : all")
-ADD_REDUCE = _reduce("__reduce_add_sync", "all + y")
-
-SYNC = f"""
-#if defined(__CUDA_ARCH__)
-    {_GROUP_MASK}
-    __syncwarp(group);
-#else
-    WP_TILE_SYNC();
-#endif
-"""
 
 # Distances from the ray's origin to a row of planes: plane * rdir + bias, fused on CUDA, where a row is two
 # loads of 16 bytes.
@@ -100,6 +49,25 @@ ROW_1 = """
     return wp::vec_t<1, wp::uint32>(__ldg(row));
 #else
     return wp::vec_t<1, wp::uint32>(*row);
+#endif
+"""
+
+# The slots behind each slot, as bytes: two words of one octant, or the byte of the lane's own slot.
+BEHIND_8 = """
+    const wp::uint32* row = (const wp::uint32*)units + at;
+#if defined(__CUDA_ARCH__)
+    const uint2 a = __ldg((const uint2*)row);
+    return wp::vec_t<2, wp::uint32>(a.x, a.y);
+#else
+    return wp::vec_t<2, wp::uint32>(row[0], row[1]);
+#endif
+"""
+BEHIND_1 = """
+    const unsigned char* byte = (const unsigned char*)((const wp::uint32*)units + at) + lane;
+#if defined(__CUDA_ARCH__)
+    return wp::vec_t<2, wp::uint32>(__ldg(byte), 0u);
+#else
+    return wp::vec_t<2, wp::uint32>(*byte, 0u);
 #endif
 """
 
@@ -285,6 +253,21 @@ LIST_HIT = """
     hit[2] = v;
     *(int*)(hit + 3) = prim;
 """
+
+
+# An element of an array. On CUDA the product is one instruction, which compilers do not split: strides in 64
+# bits, computed before a loop, would take two registers each for the whole of a kernel.
+_ELEMENT = """
+#if defined(__CUDA_ARCH__)
+    wp::int64 offset;
+    asm("mul.wide.s32 %0, %1, %2;" : "=l"(offset) : "r"(i), "r"((int)values.strides[0]));
+#else
+    const wp::int64 offset = (wp::int64)i * values.strides[0];
+#endif
+    TYPE* element = (TYPE*)((char*)values.data + offset);
+"""
+READ_ELEMENT = _ELEMENT + "    return *element;"
+WRITE_ELEMENT = _ELEMENT + "    *element = value;"
 
 
 def shared_stack_code(words: int) -> str:

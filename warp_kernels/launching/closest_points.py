@@ -6,12 +6,23 @@ from typing import Any
 import warp as wp
 
 from wive.warp_kernels.lanes.precision import PRECISIONS
-from wive.warp_kernels.launching.kernels import MODULE_OPTIONS, value_of
+from wive.warp_kernels.launching.kernels import MODULE_OPTIONS
 from wive.warp_kernels.launching.launch import default_block_dim
 from wive.warp_kernels.traversal.closest_point import Located, make_closest_point
 from wive.warp_kernels.tree.handle import CORRUPTION, HANDLES
 from wive.warp_kernels.tree.quiet import launch
 from wive.warp_kernels.tree.tree import Tree
+
+
+@wp.func
+def value_of(values: wp.array(dtype=wp.float32), i: int):
+    """The i-th of one value per point, or the one value for all points."""
+    return values[wp.where(values.shape[0] == 1, 0, i)]
+
+
+@wp.func
+def value_of(values: wp.array(dtype=wp.float64), i: int):
+    return values[wp.where(values.shape[0] == 1, 0, i)]
 
 
 @functools.cache

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from wive.warp_kernels.lanes.lanes import Lanes, expected_lanes
+from wive.warp_kernels.lanes.warps import Lanes, expected_lanes
 from wive.warp_kernels.launching.kernels import make_kernel
 from wive.warp_kernels.launching.sorting import shift_counts, sort_kernel
 from wive.warp_kernels.tree.handle import LISTED_HITS
@@ -22,6 +22,11 @@ MOST_THREADS = 1024  # per block, on every CUDA device
 MOST_CUDA_THREADS = {"float32": 512, "float64": 384}
 # Static shared memory of a block is 48 KiB on every CUDA device; 1 KiB is for what triangle tests keep.
 SHARED_BYTES = 47 * 1024
+# Warps trace several rays per lane, so that lanes whose ray has ended take another, if all that the GPU holds
+# have rays then.
+RESIDENT_WARPS = 24  # per multiprocessor
+MOST_TURNS = 16
+CPU_THREADS = 64  # Warp's CPU device runs them one after another
 
 
 def default_block_dim(lanes: int) -> int:
@@ -203,17 +208,30 @@ def _launch(
     if len(rays[0]) == 0:
         return
     kernel = make_kernel(query, tree.accuracy, lanes, tree.stack, counters, tree.nodes, tree.precision)
+    turns = turns_of(tree.device, len(rays[0]))
     with cpu_blocks(lanes == 1 and tree.device.is_cpu):
         launch(
             kernel,
-            (len(rays[0]), 8 // lanes),
-            [tree.batch_handle, *rays],
+            threads_of(len(rays[0]), turns, lanes, block_dim),
+            [tree.batch_handle, *rays, turns],
             list(outputs),
             device=tree.device,
             stream=stream,
             block_dim=block_dim,
             record_tape=False,
         )
+
+
+def turns_of(device: wp.Device, count: int) -> int:
+    """How many rays there are per lane, of so many: all threads that the device holds at once have some."""
+    threads = 32 * RESIDENT_WARPS * device.sm_count if device.is_cuda else CPU_THREADS
+    return max(1, min(MOST_TURNS, count // threads))
+
+
+def threads_of(count: int, turns: int, lanes: Lanes, block_dim: int) -> int:
+    """Threads of a launch over so many rays: whole blocks, whose warps share the rays out."""
+    threads = 8 // lanes * -(-count // turns)
+    return block_dim * -(-threads // block_dim)
 
 
 def _expected_block_dim(tree: Tree, lanes: Lanes, block_dim: int | None) -> int:

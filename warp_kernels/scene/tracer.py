@@ -34,8 +34,8 @@ from wive.warp_kernels import (
     scan_counts,
     upload,
 )
-from wive.warp_kernels.lanes.lanes import expected_lanes
 from wive.warp_kernels.lanes.precision import PRECISIONS
+from wive.warp_kernels.lanes.warps import expected_lanes
 from wive.warp_kernels.scene.hits import WarpAllHits, WarpClosest, WarpHits
 from wive.warp_kernels.scene.inside import negate, odd
 from wive.warp_kernels.scene.memory import expect_hits_fit, memory_errors

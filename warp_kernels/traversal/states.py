@@ -11,10 +11,13 @@ from wive.warp_kernels.tree.handle import derive_struct
 
 @wp.struct
 class Traversal:
-    """The result of one thread's traversal: its own hits, and the steps that the ray's threads took."""
+    """One thread's traversal of one ray: its own hits, and what the ray's threads share."""
 
     found: Best
-    tmax: wp.float32  # for boxes, the same in all threads of the ray
+    tmax: wp.float32  # for boxes
+    child: wp.int32  # to be visited next; END_OF_STACK when the traversal has ended
+    top: wp.int32  # of the stack
+    steps: wp.int32
     inner_nodes: wp.int32
     leaves: wp.int32
     triangles: wp.int32

@@ -1,22 +1,23 @@
-"""The WiVe traversal of the 8-wide tree, one ray at a time, as cpu/traverse/traversal.h.
+"""The WiVe traversal of the 8-wide tree, step by step, as cpu/traverse/traversal.h.
 
 Fuetterling, Lojewski, Pfreundt, Hamann, Ebert: "Accelerated Single Ray Tracing for Wide Vector Units", HPG
 2017. The paper's four steps (A) order, (B) slabs, (C) compress, (D) store are in slabs.py.
 """
 
 import functools
+from types import SimpleNamespace
 from typing import Any
 
 import warp as wp
 
 from wive.warp_kernels.lanes.lanes import address_of, lanes_of, without_gradient
 from wive.warp_kernels.lanes.layout import ALL_BITS, END_OF_STACK, NO_PRIM, NODE_WIDTH, WORD_MASK
-from wive.warp_kernels.lanes.precision import PRECISIONS
+from wive.warp_kernels.lanes.precision import PRECISIONS, stack_numbers
 from wive.warp_kernels.queries.frame import FRAMES, box_tmax
 from wive.warp_kernels.queries.query_exact import query_of
 from wive.warp_kernels.traversal.leaf import make_count, make_leaf_test, make_offer
 from wive.warp_kernels.traversal.nearest import keep_nearest_double, sortable, unsortable
-from wive.warp_kernels.traversal.slabs import make_visit
+from wive.warp_kernels.traversal.slabs import BOX_WORDS, make_keep, make_visit
 from wive.warp_kernels.traversal.states import TRAVERSALS
 from wive.warp_kernels.tree.blocks import block_form
 from wive.warp_kernels.tree.handle import CORRUPTION, HANDLES
@@ -28,6 +29,10 @@ from wive.warp_kernels.triangles import (
     triangle_watertight_float64,
 )
 from wive.warp_kernels.triangles.triangle_exact import make_exact_offer
+
+# What queries need of a ray, as numbers in the stack's memory.
+TMIN = 0
+UNSCALE = 1
 
 # The triangle test of each accuracy and precision, and the words that it keeps of a ray.
 TRIANGLES = {
@@ -43,7 +48,7 @@ TRIANGLES = {
 
 
 @functools.cache
-def make_traversal(
+def make_steps(
     query: str,
     accuracy: str,
     length: int,
@@ -51,23 +56,31 @@ def make_traversal(
     counters: bool,
     nodes: str = "float32",
     precision: str = "float32",
-) -> wp.Function:
-    """The traversal for a query, accuracy, lane form, stack size, node form and precision.
+) -> SimpleNamespace:
+    """The steps of a traversal, for a query, accuracy, lane form, stack size, node form and precision.
 
-    traverse(tree, ray, lane, found) continues from the state `found` and returns one of TRAVERSALS. Its stack
-    holds `stack_size` children, behind them their distances if the query is in order, and behind these what
-    the triangle test keeps of the ray.
+    keep(ray, stack) comes first, and check(...) before each step(...), which all threads of a warp take
+    together, to leaves or to inner nodes; those that do not `go` keep their traversal as it is. settled(...)
+    is what a thread has found at the end.
+
+    The stack, a new_stack(), holds `stack_size` children, behind them their distances if the query is in
+    order, and behind these what triangle tests, visits and queries need of the ray.
     """
     query_type = query_of(query, accuracy, precision)
     in_order: bool = query_type.in_order
     first_hit_ends: bool = query_type.first_hit_ends
     make_triangles, ray_words = TRIANGLES[accuracy, precision]
     ray_base = stack_size * (2 if in_order else 1)
-    lanes = lanes_of(length, ray_base + ray_words, precision)
+    box_base = ray_base + ray_words
+    own_base = box_base + BOX_WORDS
+    lanes = lanes_of(length, own_base + 2 * PRECISIONS[precision].words, precision)
     blocks, node = block_form(lanes, nodes, precision), NODES[nodes](lanes)
     triangles = make_triangles(lanes, blocks, ray_base, precision, query_type.crossings)
     frame_type = FRAMES[precision]
-    visit = make_visit(lanes, node, stack_size, in_order, frame_type)
+    keep_box = make_keep(lanes, box_base, frame_type)
+    visit = make_visit(lanes, node, stack_size, box_base, in_order)
+    numbers = stack_numbers(lanes, precision, own_base)
+    store, load = numbers.store, numbers.load
     real = PRECISIONS[precision].real
     offer = (make_exact_offer if accuracy == "exact" else make_offer)(query_type, lanes, triangles, real)
     test_leaf = make_leaf_test(query_type, lanes, blocks, triangles.candidates, offer, real)
@@ -75,75 +88,155 @@ def make_traversal(
     node_words: int = node.words
     block_words: int = blocks.least_words
     tree_type, found_type = HANDLES[accuracy, precision], query_type.state
-    result_type = TRAVERSALS[found_type]
+    walk_type = TRAVERSALS[found_type]
     # Hits of a ray's threads whose t round to the same float32 number are compared once more at the end.
     compares: bool = in_order and length == 1 and (accuracy == "exact" or precision == "float64")
     keep_nearest: Any = None
     if compares:
         keep_nearest = triangles.keep_nearest if accuracy == "exact" else keep_nearest_double(lanes)
     prepare = triangles.prepare
-    new_stack, sync = lanes.new_stack, lanes.sync
+    stack_argument, sync = lanes.stack_argument, lanes.sync
     store_word, load_word = lanes.store_word, lanes.load_word
-    or_reduce, min_reduce = lanes.or_reduce, lanes.min_reduce
+    group_vote, min_reduce = lanes.group_vote, lanes.min_reduce
 
     @without_gradient
     @wp.func
-    def traverse(tree: tree_type, ray: frame_type, lane: int, found: found_type) -> result_type:
-        units = address_of(tree.units)
-        words = wp.uint32(tree.units.shape[0])
-        result = result_type()
-        result.found = found
-        result.tmax = box_tmax(ray.tmax)
-        stack = new_stack()
+    def keep(ray: frame_type, stack: stack_argument):
+        """Keep in the stack's memory what the steps need of a ray, and the bottom of the stack."""
         prepare(ray, stack)
+        keep_box(ray, stack)
+        store(stack, TMIN, ray.tmin)
+        store(stack, UNSCALE, ray.unscale)
         # The bottom of the stack is always near enough to be popped, and its child ends the traversal.
         store_word(stack, 0, ALL_BITS)
         if wp.static(in_order):
             store_word(stack, stack_size, wp.cast(-wp.inf, wp.uint32))
-        # int() makes variables of what Warp would take for constants.
-        top = int(1)
-        child = int(0)
-        steps = int(0)
-        sync()
-        while child != END_OF_STACK:
-            begin = child & WORD_MASK
-            inner = child >= 0
-            block_count = (child & 7) + 1
-            end = wp.uint32(begin) + wp.uint32(wp.where(inner, node_words, block_count * block_words))
-            steps += 1
-            if steps > tree.step_limit or top > wp.static(stack_size - NODE_WIDTH) or end > words:
-                tree.error[CORRUPTION] = 1
-                break
-            if inner:
-                top += visit(units, begin, lane, ray, result.tmax, stack, top) - 1
-                sync()
-                if wp.static(counters):
-                    result.inner_nodes += 1
-            else:
-                leaf = test_leaf(units, begin, block_count, lane, stack, ray.tmin, result.found)
-                result.found = leaf.found
-                if wp.static(counters):
-                    result.leaves += 1
-                    last = int(min_reduce(wp.uint32(leaf.last)))
-                    result.triangles += count_triangles(units, begin, wp.min(block_count, last + 1))
-                if wp.static(in_order):
-                    result.tmax = unsortable(min_reduce(sortable(box_tmax(result.found.t))))
-                if wp.static(first_hit_ends):
-                    hit = wp.where(result.found.prim != NO_PRIM, wp.uint32(1), wp.uint32(0))
-                    if or_reduce(hit) != wp.uint32(0):
-                        break
-                top -= 1
-            child = wp.cast(load_word(stack, top), wp.int32)
+
+    @without_gradient
+    @wp.func
+    def begin(ray: frame_type, found: found_type) -> walk_type:
+        """The traversal at the root."""
+        walk = walk_type()
+        walk.found = found
+        walk.tmax = box_tmax(ray.tmax)
+        walk.top = 1
+        return walk
+
+    @without_gradient
+    @wp.func
+    def check(tree: tree_type, walk: walk_type, goes: bool) -> walk_type:
+        """End the traversal, with an error, if it goes on but can't take its next step."""
+        begin = walk.child & WORD_MASK
+        size = wp.where(walk.child >= 0, node_words, ((walk.child & 7) + 1) * block_words)
+        walk.steps += wp.where(goes, 1, 0)
+        if goes and (
+            walk.steps > tree.step_limit
+            or walk.top > wp.static(stack_size - NODE_WIDTH)
+            or wp.uint32(begin) + wp.uint32(size) > wp.uint32(tree.units.shape[0])
+        ):
+            tree.error[CORRUPTION] = 1
+            walk.child = END_OF_STACK
+        return walk
+
+    # Structs are changed field by field: one that is assigned as a whole under a condition takes its
+    # registers twice on CUDA.
+
+    @without_gradient
+    @wp.func
+    def step(
+        units: wp.uint64, lane: int, stack: stack_argument, walk: walk_type, goes: bool, at_leaf: bool
+    ) -> walk_type:
+        """Test the triangles of a leaf or visit an inner node, and take the next child from the stack."""
+        begin = walk.child & WORD_MASK
+        if at_leaf:
+            block_count = (walk.child & 7) + 1
+            last = wp.uint32(0)
+            if goes:
+                leaf = test_leaf(units, begin, block_count, lane, stack, load(stack, TMIN), walk.found)
+                walk.found = leaf.found
+                last = wp.uint32(leaf.last)
+                walk.top -= 1
+            if wp.static(counters):
+                last = min_reduce(last)
+                if goes:
+                    walk.leaves += 1
+                    walk.triangles += count_triangles(units, begin, wp.min(block_count, int(last) + 1))
             if wp.static(in_order):
-                # Pop the children that are now behind the best hit.
-                while wp.cast(load_word(stack, stack_size + top), wp.float32) > result.tmax:
-                    top -= 1
-                    child = wp.cast(load_word(stack, top), wp.int32)
+                # Threads that do not go are among others that do not, whose least it is already.
+                walk.tmax = unsortable(min_reduce(sortable(box_tmax(walk.found.t))))
+            if wp.static(first_hit_ends):
+                hit = group_vote(wp.where(walk.found.prim != NO_PRIM, wp.uint32(1), wp.uint32(0)))
+                if goes and hit != wp.uint32(0):
+                    walk.top = 0  # where the child is that ends the traversal
+        else:
+            count = visit(units, begin, lane, walk.tmax, stack, walk.top, goes)
             sync()
+            if goes:
+                walk.top += count - 1
+                if wp.static(counters):
+                    walk.inner_nodes += 1
+        if goes:
+            walk.child = wp.cast(load_word(stack, walk.top), wp.int32)
+            if wp.static(in_order):
+                # Those that are behind the best hit are passed over.
+                while wp.cast(load_word(stack, stack_size + walk.top), wp.float32) > walk.tmax:
+                    walk.top -= 1
+                    walk.child = wp.cast(load_word(stack, walk.top), wp.int32)
+        sync()
+        return walk
+
+    @without_gradient
+    @wp.func
+    def settled(units: wp.uint64, lane: int, stack: stack_argument, walk: walk_type) -> walk_type:
+        """The traversal at its end: threads of the ray at its tmax have the closest hit."""
         if wp.static(compares):
-            result.found = keep_nearest(units, stack, lane, result.found)
-            own = wp.where(result.found.prim == NO_PRIM, wp.inf, box_tmax(result.found.t))
-            result.tmax = unsortable(min_reduce(sortable(own)))
-        return result
+            walk.found = keep_nearest(units, stack, lane, walk.found)
+            own = wp.where(walk.found.prim == NO_PRIM, wp.inf, box_tmax(walk.found.t))
+            walk.tmax = unsortable(min_reduce(sortable(own)))
+        return walk
+
+    @without_gradient
+    @wp.func
+    def unscale(stack: stack_argument):
+        """t in the frame's units over t of the caller's ray."""
+        return load(stack, UNSCALE)
+
+    return SimpleNamespace(
+        keep=keep,
+        begin=begin,
+        check=check,
+        step=step,
+        settled=settled,
+        unscale=unscale,
+        new_stack=lanes.new_stack,
+        sync=sync,
+    )
+
+
+@functools.cache
+def make_traversal(
+    query: str, accuracy: str, stack_size: int, nodes: str = "float32", precision: str = "float32"
+) -> wp.Function:
+    """The whole traversal of one ray by one thread, which need not be together with others.
+
+    traverse(tree, ray, found) continues from the state `found` and returns one of TRAVERSALS.
+    """
+    steps = make_steps(query, accuracy, 8, stack_size, False, nodes, precision)
+    keep, begin, check, new_stack = steps.keep, steps.begin, steps.check, steps.new_stack
+    step = steps.step
+    tree_type, found_type = HANDLES[accuracy, precision], query_of(query, accuracy, precision).state
+    frame_type, walk_type = FRAMES[precision], TRAVERSALS[found_type]
+
+    @without_gradient
+    @wp.func
+    def traverse(tree: tree_type, ray: frame_type, found: found_type) -> walk_type:
+        units = address_of(tree.units)
+        stack = new_stack()
+        keep(ray, stack)
+        walk = begin(ray, found)
+        while walk.child != END_OF_STACK:
+            walk = check(tree, walk, True)
+            walk = step(units, 0, stack, walk, walk.child != END_OF_STACK, walk.child < 0)
+        return walk
 
     return traverse

@@ -1,14 +1,14 @@
-"""Kernels that turn the order lanes of uploaded nodes into ranks."""
+"""Kernels that turn the order lanes of uploaded nodes into what a lane needs to find its own place."""
 
 import warp as wp
 
 from wive.warp_kernels.lanes.layout import (
+    BEHIND_ROW,
     COMPRESSED_NODE_WORDS,
     COMPRESSED_RANK_BITS,
     COMPRESSED_RANKS,
     NODE_WORDS,
-    RANK_BITS,
-    RANK_ROW,
+    ORDER_BITS,
 )
 
 Lanes = wp.types.vector(dtype=wp.uint32, length=8)
@@ -28,14 +28,22 @@ def inverted(orders: Lanes, bits: int) -> Lanes:
 
 @wp.kernel(enable_backward=False, module="unique")
 def invert_orders(units: wp.array(dtype=wp.float32)):
-    """One thread per node, one word per lane."""
-    row = wp.tid() * NODE_WORDS + RANK_ROW
-    orders = Lanes()
+    """One thread per node: a byte for each slot in each of the octants 0 to 3, the slots that come behind it.
+
+    Octant 7 - o is octant o backwards.
+    """
+    row = wp.tid() * NODE_WORDS + BEHIND_ROW
+    behind = Lanes()
+    for octant in range(4):
+        later = wp.uint32(0)
+        for i in range(8):
+            order = wp.cast(units[row + 7 - i], wp.uint32)
+            slot = (order >> wp.uint32(ORDER_BITS * octant)) & wp.uint32(7)
+            word = 2 * octant + wp.int32(slot >> wp.uint32(2))
+            behind[word] = behind[word] | (later << (wp.uint32(8) * (slot & wp.uint32(3))))
+            later = later | (wp.uint32(1) << slot)
     for i in range(8):
-        orders[i] = wp.cast(units[row + i], wp.uint32)
-    ranks = inverted(orders, RANK_BITS)
-    for i in range(8):
-        units[row + i] = wp.cast(ranks[i], wp.float32)
+        units[row + i] = wp.cast(behind[i], wp.float32)
 
 
 @wp.kernel(enable_backward=False, module="unique")

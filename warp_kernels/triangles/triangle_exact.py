@@ -9,8 +9,8 @@ from wive.warp_kernels.lanes.exact_native import (
     may_hit,
     solve_exactly,
 )
-from wive.warp_kernels.lanes.lanes import lowest_lane, product, without_gradient
-from wive.warp_kernels.lanes.layout import NO_PRIM
+from wive.warp_kernels.lanes.lanes import product, without_gradient
+from wive.warp_kernels.lanes.layout import NO_PRIM, NODE_WIDTH
 from wive.warp_kernels.lanes.precision import stack_numbers
 from wive.warp_kernels.queries.frame import MAX_FLOAT, SUBNORMAL_STEP, RayFrame, axes_of, component
 from wive.warp_kernels.queries.query import Query
@@ -57,7 +57,7 @@ def exact_triangles(
     length: int = lanes.triangles_length
     used, stride_of, vertex_at = blocks.used, blocks.stride, blocks.vertex_at
     store_word, load_word, stack_argument = lanes.store_word, lanes.load_word, lanes.stack_argument
-    or_reduce = lanes.or_reduce
+    broadcast = lanes.broadcast
     numbers = stack_numbers(lanes, "float32", ray_base)
     doubles = stack_numbers(lanes, "float64", ray_base + DOUBLE_WORDS)
     store, load, load_vector = numbers.store, numbers.load, numbers.load_vector
@@ -175,21 +175,18 @@ def exact_triangles(
     @wp.func
     def keep_nearest(units: wp.uint64, stack: stack_argument, lane: int, best: ExactBest):
         """Keep the nearest hit among a ray's eight threads; the other seven report a miss."""
-        rivals = or_reduce(wp.where(best.prim == NO_PRIM, wp.uint32(0), wp.uint32(1 << lane)))
         beaten = bool(False)
-        while rivals != wp.uint32(0):
-            i = lowest_lane(rivals)
-            rivals = rivals & (rivals - wp.uint32(1))
-            t = wp.cast(
-                or_reduce(wp.where(lane == i, wp.cast(best.given_t, wp.uint32), wp.uint32(0))), wp.float32
-            )
-            place = int(or_reduce(wp.where(lane == i, wp.uint32(best.place), wp.uint32(0))))
-            prim = int(or_reduce(wp.where(lane == i, wp.uint32(best.prim), wp.uint32(0))))
-            if lane != i and best.prim != NO_PRIM:
+        i = int(0)
+        while i < NODE_WIDTH:
+            t = wp.cast(broadcast(wp.cast(best.given_t, wp.uint32), i), wp.float32)
+            place = int(broadcast(wp.uint32(best.place), i))
+            prim = int(broadcast(wp.uint32(best.prim), i))
+            if lane != i and best.prim != NO_PRIM and prim != NO_PRIM:
                 if t < best.given_t:
                     beaten = True
                 if t == best.given_t and comes_before(units, place, prim, best.place, best.prim, stack):
                     beaten = True
+            i += 1
         if beaten:
             best.prim = NO_PRIM
         return best

@@ -1,0 +1,132 @@
+"""The loop of a warp over its share of a launch's rays.
+
+A lane whose ray has ended waits until several have, and these take the next rays of the warp's share. In each
+round the warp votes whether to visit inner nodes or leaves, whichever more of its lanes wait for. So most of
+its lanes are active in each instruction. What a ray finds does not depend on other rays.
+"""
+
+import warp as wp
+
+from wive.warp_kernels.lanes.lanes import address_of, without_gradient
+from wive.warp_kernels.lanes.layout import END_OF_STACK
+from wive.warp_kernels.lanes.warps import warp_of
+from wive.warp_kernels.launching.outputs import ELEMENTS, OUTPUTS, RAYS, make_settle, make_start
+from wive.warp_kernels.queries.frame import FRAMES, box_tmax, make_load_frame
+from wive.warp_kernels.queries.query_exact import query_of
+from wive.warp_kernels.traversal.states import TRAVERSALS
+from wive.warp_kernels.traversal.traversal import make_steps
+from wive.warp_kernels.tree.handle import CORRUPTION, HANDLES
+
+# Lanes that wait for rays before they are given some.
+IDLE_LANES = 8
+
+
+@wp.struct
+class Share:
+    """Where a lane is in its warp's share of the rays."""
+
+    next_ray: wp.int32  # to be given to a lane
+    number: wp.int32  # of the lane's own ray; negative if it has none
+    going: wp.int32  # whether the warp has more to do
+
+
+def make_loop(
+    query: str, accuracy: str, length: int, stack_size: int, counters: bool, nodes: str, precision: str
+) -> wp.Function:
+    """trace_share(tree, rays, out, thread, turns), for each thread of a launch.
+
+    turns: the rays that a warp traces in all, over those that it traces at once.
+    """
+    steps = make_steps(query, accuracy, length, stack_size, counters, nodes, precision)
+    keep, check, step = steps.keep, steps.check, steps.step
+    settled, unscale, new_stack, sync = steps.settled, steps.unscale, steps.new_stack, steps.sync
+    warp = warp_of(length)
+    vote, warp_index, warp_lane, warp_rays = warp.vote, warp.index, warp.lane, warp.rays
+    threads: int = warp.threads
+    start = make_start(query, accuracy, precision)
+    found_before, wanted = start.found, start.wanted
+    settle = make_settle(query, accuracy, length, counters, precision)
+    load_frame = make_load_frame(accuracy, precision)
+    read, read_vec3 = ELEMENTS[precision].read, ELEMENTS[precision].read_vec3
+    tree_type, frame_type = HANDLES[accuracy, precision], FRAMES[precision]
+    walk_type = TRAVERSALS[query_of(query, accuracy, precision).state]
+    rays_type, outputs_type = RAYS[precision], OUTPUTS[precision]
+
+    @wp.func
+    def vote_on(condition: bool):
+        return vote(wp.where(condition, wp.uint32(1), wp.uint32(0)))
+
+    @wp.func
+    def rays_in(lanes: wp.uint32):
+        """The number of rays that lanes of the warp trace."""
+        return wp.int32(wp.bit_count(lanes)) // threads
+
+    @without_gradient
+    @wp.func
+    def load_ray(center: wp.vec3, rays: rays_type, i: int) -> frame_type:
+        return load_frame(
+            center,
+            read_vec3(rays.origins, i),
+            read_vec3(rays.directions, i),
+            read(rays.tmin, wp.where(rays.tmin.shape[0] == 1, 0, i)),
+            read(rays.tmax, wp.where(rays.tmax.shape[0] == 1, 0, i)),
+        )
+
+    @without_gradient
+    @wp.func
+    def trace_share(tree: tree_type, rays: rays_type, out: outputs_type, thread: int, turns: int):
+        units = address_of(tree.units)
+        lane_of_warp = warp_lane(thread)
+        lane = lane_of_warp & (threads - 1)
+        lanes_below = (wp.uint32(1) << wp.uint32(lane_of_warp)) - wp.uint32(1)
+        # Numbers that change under conditions are fields of a struct: as variables they take more registers.
+        share = Share()
+        # In 64 bits: the last warps may have no rays, and theirs would begin beyond 2^31.
+        count = wp.int64(rays.origins.shape[0])
+        rays_per_warp = wp.int64(warp_rays() * turns)
+        first = wp.int64(warp_index(thread)) * rays_per_warp
+        share.next_ray = wp.int32(wp.min(first, count))
+        share.number = -1
+        share.going = 1
+        end = wp.int32(wp.min(first + rays_per_warp, count))
+        stack = new_stack()
+        walk = walk_type()
+        walk.child = END_OF_STACK
+        # One answer for the warp, whose threads may see the flag change at different times.
+        sound = vote(wp.uint32(tree.error[CORRUPTION])) == wp.uint32(0)
+        while share.going != 0:
+            busy = vote_on(walk.child != END_OF_STACK)
+            idle = vote_on(walk.child == END_OF_STACK)
+            waiting = wp.int32(wp.bit_count(idle))
+            if busy == wp.uint32(0) or (share.next_ray < end and waiting >= IDLE_LANES):
+                ends = walk.child == END_OF_STACK
+                last = settled(units, lane, stack, walk)
+                settle(out, share.number, lane, unscale(stack), last, ends and share.number >= 0)
+                sync()  # the old ray's numbers have been read
+                left = end - share.next_ray
+                share.going = wp.min(left, 1)
+                if ends:
+                    place = rays_in(idle & lanes_below)
+                    share.number = wp.where(place < left, share.next_ray + place, -1)
+                    if place < left:
+                        ray = load_ray(tree.center, rays, share.number)
+                        keep(ray, stack)
+                        walk.found = found_before(out, share.number, ray)
+                        walk.tmax = box_tmax(ray.tmax)
+                        walk.top = 1
+                        walk.steps = 0
+                        walk.inner_nodes = 0
+                        walk.leaves = 0
+                        walk.triangles = 0
+                        if sound and ray.valid and wanted(out, share.number):
+                            walk.child = 0
+                share.next_ray += wp.min(rays_in(idle), left)
+                sync()
+            at_leaf = walk.child < END_OF_STACK
+            at_node = walk.child > END_OF_STACK
+            leaves = wp.bit_count(vote_on(at_leaf)) > wp.bit_count(vote_on(at_node))
+            goes = wp.where(leaves, at_leaf, at_node)
+            walk = check(tree, walk, goes)
+            walk = step(units, lane, stack, walk, goes and walk.child != END_OF_STACK, leaves)
+
+    return trace_share
