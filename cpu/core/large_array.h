@@ -12,6 +12,8 @@
 
 #if defined(__linux__)
 #include <sys/mman.h>
+#elif defined(_WIN32)
+#include <malloc.h>
 #endif
 
 namespace wive {
@@ -29,7 +31,11 @@ public:
         const std::size_t alignment = bytes >= huge_page ? huge_page : cache_line;
         const std::size_t rounded = (bytes + alignment - 1) / alignment * alignment;
         expect_memory(rounded);
+#if defined(_WIN32)
+        data_.reset(static_cast<T*>(_aligned_malloc(rounded, alignment)));
+#else
         data_.reset(static_cast<T*>(std::aligned_alloc(alignment, rounded)));
+#endif
         if (!data_) throw OutOfMemory("not enough memory: can't allocate " + bytes_text(rounded));
 #if defined(__linux__)
         if (alignment == huge_page) madvise(data_.get(), rounded, MADV_HUGEPAGE);
@@ -51,7 +57,11 @@ public:
 
 private:
     struct Free {
+#if defined(_WIN32)
+        void operator()(T* p) const { _aligned_free(p); }
+#else
         void operator()(T* p) const { std::free(p); }
+#endif
     };
     std::unique_ptr<T[], Free> data_;
     std::size_t size_ = 0;

@@ -1,12 +1,15 @@
 // Layout of the tree in memory. Every backend traverses this one layout.
 #pragma once
 
+#include <bit>
 #include <cassert>
 #include <cstddef>
 #include <cstdint>
 #include <type_traits>
 
 namespace wive {
+
+static_assert(std::endian::native == std::endian::little, "trees are stored and shared in this byte order");
 
 inline constexpr int node_width = 8;           // children of a node
 inline constexpr int block_width = 4;          // triangles of a block

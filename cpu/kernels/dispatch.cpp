@@ -2,32 +2,11 @@
 
 #include <stdexcept>
 
+#include "core/processor.h"
 #include "kernels/avx512_form.h"
-
-#if defined(__x86_64__)
-#include <cpuid.h>
-#endif
 
 namespace wive {
 namespace {
-
-#if defined(__x86_64__)
-bool has_lzcnt() {  // not every compiler's __builtin_cpu_supports knows it; a CPU without it would run lzcnt as bsr
-    unsigned a = 0, b = 0, c = 0, d = 0;
-    return __get_cpuid(0x80000001u, &a, &b, &c, &d) != 0 && (c >> 5 & 1u) != 0;
-}
-bool has_avx2() {
-    return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") && __builtin_cpu_supports("bmi") &&
-           __builtin_cpu_supports("bmi2") && __builtin_cpu_supports("popcnt") && has_lzcnt();
-}
-bool has_avx512() {
-    return has_avx2() && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl") &&
-           __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512bw");
-}
-#else
-bool has_avx2() { return false; }
-bool has_avx512() { return false; }
-#endif
 
 struct Entry {
     std::string_view name;
@@ -38,7 +17,6 @@ struct Entry {
     std::string_view needs;
 };
 
-// Filled once: on a virtual machine one CPUID instruction takes microseconds.
 const std::vector<Entry>& entries() {
     constexpr std::string_view avx512 = "AVX-512 F, VL, DQ or BW", avx2 = "AVX2, FMA, BMI1, BMI2, LZCNT or POPCNT";
     static const bool x86_64 = avx512_half_kernels() != nullptr;

@@ -6,6 +6,7 @@
 #include <type_traits>
 
 #include "core/lanes4.h"
+#include "core/processor.h"
 #include "python/bindings.h"
 #include "python/each_hit.h"
 
@@ -98,15 +99,6 @@ template <class Real>
 template <class Real>
 [[gnu::flatten, gnu::noinline]] void run_plain(const SpawnCall<Real>& call, std::size_t begin, std::size_t end) {
     call.run(begin, end);
-}
-
-bool has_avx2() {
-#if defined(__x86_64__)
-    static const bool has = __builtin_cpu_supports("avx2");
-    return has;
-#else
-    return false;
-#endif
 }
 
 // accuracy: as SpawnOrigin numbers them; constants: the members of SpawnOrigin from point_error on.

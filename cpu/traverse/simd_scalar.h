@@ -7,6 +7,10 @@
 #include <type_traits>
 #include <utility>
 
+#if defined(__aarch64__)
+#include <arm_neon.h>
+#endif
+
 #include "traverse/stack.h"
 
 #ifndef WIVE_INLINE
@@ -36,21 +40,44 @@ struct ScalarLanes {
     // One bit per lane, lane 0 lowest: the sign bit of each.
     template <class MakePart>
     WIVE_INLINE static unsigned sign_mask(MakePart make_part) {
+#if defined(__SSE2__)
         unsigned bits = 0;
 #pragma GCC unroll 2
-        for (int i = 0; i < parts; ++i) bits |= sign_mask_of((PartMask)make_part(i)) << i * part_width;
+        for (int i = 0; i < parts; ++i) {
+            const auto part = (PartMask)make_part(i);
+            if constexpr (part_width == 4)
+                bits |= static_cast<unsigned>(__builtin_ia32_movmskps((__attribute__((vector_size(16))) float)part))
+                        << i * part_width;
+            else
+                bits |= static_cast<unsigned>(__builtin_ia32_movmskpd((__attribute__((vector_size(16))) double)part))
+                        << i * part_width;
+        }
         return bits;
-    }
-    WIVE_INLINE static unsigned sign_mask_of(PartMask m) {
-#if defined(__SSE2__)
-        if constexpr (part_width == 4)
-            return static_cast<unsigned>(__builtin_ia32_movmskps((__attribute__((vector_size(16))) float)m));
-        else
-            return static_cast<unsigned>(__builtin_ia32_movmskpd((__attribute__((vector_size(16))) double)m));
 #else
-        unsigned bits = 0;
-        for (int i = 0; i < part_width; ++i) bits |= static_cast<unsigned>(m[i] < 0) << i;
-        return bits;
+        // NEON has no such instruction: the lanes' bits are added up, those of all parts at once.
+        PartMask bits = {};
+#pragma GCC unroll 2
+        for (int i = 0; i < parts; ++i)
+            bits |= ((PartMask)make_part(i) >> std::numeric_limits<Bits>::digits) & lane_bits(i * part_width);
+        return sum(bits);
+#endif
+    }
+    WIVE_INLINE static PartMask lane_bits(int first) {
+        if constexpr (part_width == 4)
+            return PartMask{1, 2, 4, 8} << first;
+        else
+            return PartMask{1, 2} << first;
+    }
+    WIVE_INLINE static unsigned sum(PartMask m) {
+#if defined(__aarch64__)
+        if constexpr (part_width == 4)
+            return static_cast<unsigned>(vaddvq_s32((int32x4_t)m));
+        else
+            return static_cast<unsigned>(vaddvq_s64((int64x2_t)m));
+#else
+        Bits total = 0;
+        for (int i = 0; i < part_width; ++i) total += m[i];
+        return static_cast<unsigned>(total);
 #endif
     }
     static constexpr Bits sign_bit = std::numeric_limits<Bits>::min();
@@ -92,7 +119,18 @@ struct ScalarLanes {
     WIVE_INLINE friend ScalarLanes operator/(ScalarLanes a, ScalarLanes b) {
         return each([&](int i) { return a.part[i] / b.part[i]; });
     }
-    WIVE_INLINE friend ScalarLanes multiply_add(ScalarLanes a, ScalarLanes b, ScalarLanes c) { return a * b + c; }
+    WIVE_INLINE friend ScalarLanes multiply_add(ScalarLanes a, ScalarLanes b, ScalarLanes c) {
+#if defined(__aarch64__)
+        return each([&](int i) {
+            if constexpr (part_width == 4)
+                return (Part)vfmaq_f32((float32x4_t)c.part[i], (float32x4_t)a.part[i], (float32x4_t)b.part[i]);
+            else
+                return (Part)vfmaq_f64((float64x2_t)c.part[i], (float64x2_t)a.part[i], (float64x2_t)b.part[i]);
+        });
+#else
+        return a * b + c;
+#endif
+    }
     WIVE_INLINE friend ScalarLanes min(ScalarLanes a, ScalarLanes b) {
         return each([&](int i) { return a.part[i] < b.part[i] ? a.part[i] : b.part[i]; });
     }

@@ -13,6 +13,8 @@ PathLike = str | bytes | os.PathLike[str] | os.PathLike[bytes]
 
 # Not kept when a file is replaced: whoever may write a file's content may not give away its owner's rights.
 SET_ID = stat.S_ISUID | stat.S_ISGID
+# Windows writes "\r\n" for "\n" into a descriptor that was opened without it.
+BINARY: int = getattr(os, "O_BINARY", 0)
 
 
 def file_name(path: PathLike) -> str:
@@ -77,7 +79,7 @@ def atomic_write(path: PathLike) -> Iterator[BinaryIO]:
         replaced = _status(final)
         # Nobody else may read a private file's new content, not even before it has its mode.
         mode = 0o666 if replaced is None else 0o600
-        with open(os.open(part, os.O_WRONLY | os.O_CREAT | os.O_EXCL, mode), "wb") as file:
+        with open(os.open(part, os.O_WRONLY | os.O_CREAT | os.O_EXCL | BINARY, mode), "wb") as file:
             yield file
             put_in_place(file, part, final)
     except BaseException as error:
@@ -89,12 +91,13 @@ def atomic_write(path: PathLike) -> Iterator[BinaryIO]:
 
 
 def put_in_place(file: BinaryIO, part: str, final: str) -> None:
-    """Rename the open file `part` to `final` once it is on the disk; keep mode and owner of a file there."""
+    """Close the file `part`, once it is on the disk, and rename it `final`; keep mode and owner of one there."""
     file.flush()
     replaced = _status(final)
-    if replaced is not None:
+    if replaced is not None and os.name == "posix":
         _keep_owner_and_mode(file.fileno(), replaced)
     os.fsync(file.fileno())  # some systems find out only here that the disk is full
+    file.close()  # Windows renames no open files
     os.replace(part, final)
 
 

@@ -1,0 +1,11 @@
+// What this processor can run.
+#pragma once
+
+namespace wive {
+
+// With FMA, BMI1, BMI2, LZCNT and POPCNT.
+bool has_avx2();
+// F, VL, DQ and BW, with all that has_avx2() asks for.
+bool has_avx512();
+
+}  // namespace wive
