@@ -35,7 +35,7 @@ from wive.scene import Scene
 from wive.sensors import EquirectangularCamera, OrthographicCamera, PinholeCamera, SpinningLidar
 from wive.streams import Traced, stream, trace
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 __all__ = [
     "AllHits",
