@@ -91,7 +91,7 @@ def atomic_write(path: PathLike) -> Iterator[BinaryIO]:
 
 
 def put_in_place(file: BinaryIO, part: str, final: str) -> None:
-    """Close the file `part`, once it is on the disk, and rename it `final`; keep mode and owner of one there."""
+    """Close the file `part`, once it is on the disk, and rename it `final`; keep the mode of one there."""
     file.flush()
     replaced = _status(final)
     if replaced is not None and os.name == "posix":
