@@ -250,15 +250,12 @@ def test_ctrl_c_while_writing_leaves_the_old_file(output, monkeypatch):
     assert not list(path.parent.glob(".*"))
 
 
-def test_batches_are_written_as_one_array(tmp_path, monkeypatch):
-    from wive._internal import commands
-
-    monkeypatch.setattr(commands, "BATCH_RAYS", 7)
+def test_pieces_are_written_as_one_array(tmp_path):
     np.savez(tmp_path / "mesh.npz", **dict(zip(("vertices", "faces"), sphere(2), strict=True)))
     rays = random_rays(100, seed=2)
     np.save(tmp_path / "rays.npy", np.concatenate(rays, axis=1))
     paths = [str(tmp_path / name) for name in ("mesh.npz", "rays.npy", "hits.npz")]
-    assert main(["trace", *paths[:2], "-o", paths[2], "--all"]) == 0
+    assert main(["trace", *paths[:2], "-o", paths[2], "--all", "--piece", "7"]) == 0
     expected = wive.Scene(*sphere(2)).intersect_all(*rays)
     with np.load(paths[2]) as hits:
         for name in ("t", "prim", "uv", "offsets"):
