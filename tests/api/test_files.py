@@ -1,8 +1,6 @@
 """Scenes and meshes in files, and in pickles."""
 
 import pickle
-import re
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -87,8 +85,3 @@ def test_npz_meshes_give_their_arrays_as_float32(tmp_path):
     assert loaded_vertices.dtype == np.float32
     np.testing.assert_array_equal(loaded_vertices, vertices)
     np.testing.assert_array_equal(loaded_faces, faces)
-
-
-def test_the_version_is_that_of_the_package():
-    project = (Path(__file__).parents[2] / "pyproject.toml").read_text()
-    assert re.search(r'^version = "(.+)"$', project, re.MULTILINE).group(1) == wive.__version__

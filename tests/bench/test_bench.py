@@ -89,6 +89,7 @@ def test_bench_paper_renders_embrees_picture(bench: Callable[..., dict[str, Any]
         assert row["differing"] < 0.1
 
 
+@pytest.mark.slow
 def test_bench_order_traces_every_order(bench: Callable[..., dict[str, Any]]) -> None:
     content = bench("order", "--scenes", SCENE)
     orders = {"treelet", "diagonal", "slots", "none", "distance"}
@@ -135,6 +136,7 @@ def test_bench_python_agrees_on_closest_hits(bench: Callable[..., dict[str, Any]
     assert all(row["p50_us"] > 0 for row in content["single"])
 
 
+@pytest.mark.slow
 def test_bench_pareto_finds_no_leak_in_accuracies_that_promise_none(
     bench: Callable[..., dict[str, Any]],
 ) -> None:
