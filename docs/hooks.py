@@ -37,7 +37,7 @@ def on_page_markdown(markdown: str, page: Any, config: Any, files: Files) -> str
             place = PAGES[path]
         elif path.startswith("docs/"):
             place = path.removeprefix("docs/")
-        elif (ROOT / path).is_dir():
+        elif (ROOT / path).is_dir() or path.endswith(".md"):
             return text
         else:
             place = f"{COPIES}/{path}"
