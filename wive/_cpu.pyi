@@ -93,7 +93,8 @@ def move_part(
     holders: what traces, its tree and the vertices. The tree stays, and False is returned, unless the first
         two have as few references as those in `alike`; and if `prepare_part` was not called, or only a new
         tree will do. If the vertices have more references, or their memory is others', they are copied.
-    forget: attributes of what traces, which are deleted, as they followed from the old positions.
+    forget: attributes of what traces, which are deleted, as they followed from the old positions. Its
+        attribute `vertices` is set.
     """
 
 class Bvh:

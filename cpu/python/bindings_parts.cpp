@@ -94,6 +94,7 @@ bool move_part(const py::tuple& holders, const py::tuple& alike, const Array<Rea
     }
     const auto computed = held.tracer.attr("__dict__").cast<py::dict>();
     for (const std::string& name : forget) computed.attr("pop")(name, py::none());
+    computed["vertices"] = bvh.vertices();
     return true;
 }
 

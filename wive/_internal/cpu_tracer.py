@@ -30,7 +30,7 @@ class CpuTracer:
 
     device = None
     lacks = ("lanes",)
-    COMPUTED = ("vertices", "closed", "_ball")  # kept when read; they follow from the vertices
+    COMPUTED = ("closed", "_ball")  # kept when read; they follow from the vertices
 
     def __init__(
         self, bvh: _cpu.Bvh, faces: NDArray[np.int32], backend: str, geoms: Geoms | None = None
@@ -43,6 +43,7 @@ class CpuTracer:
             real_of(bvh.vertices.dtype, bvh.accuracy),
         )
         self._kernels = _cpu.Kernels(backend)
+        self.vertices: Floats = bvh.vertices  # `_cpu.move_part` sets it as well
         self._ready: dict[str, Callable[..., Any]] = {
             "intersect": bvh.intersect_ready,
             "occluded": bvh.occluded_ready,
@@ -129,11 +130,6 @@ class CpuTracer:
     def signed_distance(self, points: Points, sign: SignOption, work: Work) -> Any:
         """(n,) distances, negative inside."""
         return points.answer(signed_distances(self, self._faces, points, sign, work))
-
-    @functools.cached_property
-    def vertices(self) -> Floats:
-        """The tree's vertices."""
-        return self.bvh.vertices
 
     @functools.cached_property
     def closed(self) -> bool:

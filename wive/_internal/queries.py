@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, TypeVar, overload
+from typing import TYPE_CHECKING, Any, TypeVar, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -85,16 +85,13 @@ class Queries:
         Raises ValueError or TypeError, in one line naming the argument; an option that is only for other
         backends than the scene's raises ValueError.
         """
+        if progress is not None:
+            options = threads, in_flight, lanes, stats
+            return self._watched(
+                progress, self._tracer.intersect, (origins, directions, tmin, tmax), *options
+            )
         return self._query(
-            self._tracer.intersect,
-            (origins, directions, tmin, tmax),
-            threads,
-            in_flight,
-            lanes,
-            stats,
-            False,
-            None,
-            progress,
+            self._tracer.intersect, (origins, directions, tmin, tmax), threads, in_flight, lanes, stats
         )
 
     @overload
@@ -122,16 +119,11 @@ class Queries:
 
         Of the rays' leading shape if that is another, as all that queries return for each ray.
         """
+        if progress is not None:
+            options = threads, in_flight, lanes, stats
+            return self._watched(progress, self._tracer.occluded, (origins, directions, tmin, tmax), *options)
         return self._query(
-            self._tracer.occluded,
-            (origins, directions, tmin, tmax),
-            threads,
-            in_flight,
-            lanes,
-            stats,
-            False,
-            None,
-            progress,
+            self._tracer.occluded, (origins, directions, tmin, tmax), threads, in_flight, lanes, stats
         )
 
     @overload
@@ -192,17 +184,11 @@ class Queries:
         Raises ValueError or TypeError, in one line naming the argument, and MemoryError as soon as the hits
         take more than `max_bytes`, which names their number so far, or don't fit into memory.
         """
-        return self._query(
-            self._tracer.intersect_all,
-            (origins, directions, tmin, tmax),
-            threads,
-            in_flight,
-            lanes,
-            stats,
-            touching,
-            max_bytes,
-            progress,
-        )
+        options = threads, in_flight, lanes, stats, touching, max_bytes
+        rays = origins, directions, tmin, tmax
+        if progress is not None:
+            return self._watched(progress, self._tracer.intersect_all, rays, *options)
+        return self._query(self._tracer.intersect_all, rays, *options)
 
     @overload
     def count(
@@ -237,16 +223,11 @@ class Queries:
         progress: ProgressOption = None,
     ) -> NDArray[np.int32] | tuple[NDArray[np.int32], Stats]:
         """(n,) int32: how many hits `intersect_all` finds for each ray; arguments are the same."""
+        if progress is not None:
+            options = threads, in_flight, lanes, stats, touching
+            return self._watched(progress, self._tracer.count, (origins, directions, tmin, tmax), *options)
         return self._query(
-            self._tracer.count,
-            (origins, directions, tmin, tmax),
-            threads,
-            in_flight,
-            lanes,
-            stats,
-            touching,
-            None,
-            progress,
+            self._tracer.count, (origins, directions, tmin, tmax), threads, in_flight, lanes, stats, touching
         )
 
     def visible(
@@ -308,6 +289,19 @@ class Queries:
         origins: Floats = spawn_from(bvh.vertices, self._faces, prim, uv, directions, bvh.accuracy)
         return origins
 
+    def _watched(
+        self,
+        progress: ProgressOption,
+        query: Callable[[Rays, Work], tuple[Answer, Stats | None]],
+        rays: tuple[ArrayLike, ArrayLike, ArrayLike, ArrayLike],
+        *options: Any,
+    ) -> Answer | tuple[Answer, Stats]:
+        """What `_query` returns; meanwhile `progress` hears how far it is."""
+        if checked_progress(progress) is False:
+            return self._query(query, rays, *options)
+        count = ray_count(*rays)
+        return reported(progress, count, "ray", "tracing", lambda: self._query(query, rays, *options))
+
     def _query(
         self,
         query: Callable[[Rays, Work], tuple[Answer, Stats | None]],
@@ -318,22 +312,17 @@ class Queries:
         stats: bool,
         touching: bool = False,
         max_bytes: int | None = None,
-        progress: ProgressOption = None,
     ) -> Answer | tuple[Answer, Stats]:
         """Check a query's arguments; its answer, with the counters if `stats`."""
         tracer = self._tracer
         usual = threads is None and in_flight is None and stats is False and touching is False
-        if usual and max_bytes is None and progress is None and type(lanes) is str and lanes == "auto":
+        if usual and max_bytes is None and type(lanes) is str and lanes == "auto":
             at_once: Answer | None = tracer.at_once(query.__name__, *rays)
             if at_once is not None:
                 return at_once
             work = USUAL_WORK
         else:
             options = threads, in_flight, lanes, stats, touching, max_bytes
-            if progress is not None and checked_progress(progress) is not False:
-                return reported(
-                    progress, ray_count(*rays), "ray", "tracing", lambda: self._query(query, rays, *options)
-                )
             work = arguments.work(tracer.backend, tracer.lacks, *options)
         checked = check_rays(*rays, tracer.backend, tracer.device)
         answer, counters = query(checked, work) if checked.is_flat else query_shaped(query, checked, work)
