@@ -53,6 +53,7 @@ def test_bench_embree_finds_embrees_hits(bench: Callable[..., dict[str, Any]]) -
     assert content["trees"][0]["wive_sah"] > 0
 
 
+@pytest.mark.slow
 def test_bench_dask_compares_threads_and_processes(bench: Callable[..., dict[str, Any]]) -> None:
     pytest.importorskip("distributed")
     content = bench("dask", "--scenes", SCENE)
@@ -126,6 +127,7 @@ def test_bench_build_counts_bytes(bench: Callable[..., dict[str, Any]]) -> None:
     assert 30 < content["trees"][0]["wive_bytes"] < 100
 
 
+@pytest.mark.slow
 def test_bench_python_agrees_on_closest_hits(bench: Callable[..., dict[str, Any]]) -> None:
     content = bench("python", "--scenes", SCENE)
     closest = [row for row in content["rows"] if not row["query"].startswith("all")]
