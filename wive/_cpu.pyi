@@ -80,6 +80,9 @@ class Kernels:
     @property
     def name(self) -> str: ...
 
+def is_unused(holders: tuple[object, Bvh, NDArray[Real]], alike: tuple[object, Bvh, NDArray[Real]]) -> bool:
+    """Whether `move_part` would find as few references as in `alike`."""
+
 def move_part(
     holders: tuple[object, Bvh, NDArray[Real]],
     alike: tuple[object, Bvh, NDArray[Real]],

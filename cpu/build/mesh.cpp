@@ -230,12 +230,6 @@ template <class Real>
 Bounds find_bounds(const Mesh<Real>& mesh, Threads& threads) {
     constexpr double infinity = std::numeric_limits<double>::infinity();
     constexpr Bounds none = {{{infinity, infinity, infinity}, {-infinity, -infinity, -infinity}}};
-    const auto grow = [](Bounds& bounds, const auto* low, const auto* high) {
-        for (std::size_t axis = 0; axis < 3; ++axis) {
-            bounds[0][axis] = std::min<double>(bounds[0][axis], low[axis]);
-            bounds[1][axis] = std::max<double>(bounds[1][axis], high[axis]);
-        }
-    };
     std::vector<Bounds> parts((mesh.face_count + chunk_size - 1) / chunk_size, none);
     parallel_chunks(mesh.face_count, chunk_size, threads, [&](std::size_t begin, std::size_t end) {
         Bounds part = none;
@@ -249,7 +243,7 @@ Bounds find_bounds(const Mesh<Real>& mesh, Threads& threads) {
         parts[begin / chunk_size] = part;
     });
     Bounds all = none;
-    for (const Bounds& part : parts) grow(all, part[0].data(), part[1].data());
+    for (const Bounds& part : parts) grow(all, part[0], part[1]);
     return all;
 }
 

@@ -1,6 +1,7 @@
 // The caller's triangles, their checks, and the boxes that the builder makes of them.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <cassert>
@@ -101,6 +102,15 @@ bool box_triangle(const Mesh<double>& mesh, const Point& center, std::size_t fac
 
 // The lowest and the highest corner of a box; infinity and -infinity if it is empty.
 using Bounds = std::array<std::array<double, 3>, 2>;
+
+// Grows bounds to hold the box between two corners.
+template <class Corner>
+void grow(Bounds& bounds, const Corner& low, const Corner& high) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+        bounds[0][axis] = std::min<double>(bounds[0][axis], low[axis]);
+        bounds[1][axis] = std::max<double>(bounds[1][axis], high[axis]);
+    }
+}
 
 // The bounds of the triangles with an area.
 template <class Real>

@@ -26,13 +26,6 @@ Box box_of_planes(const Node& node) {
     return all;
 }
 
-void grow(Bounds& bounds, const Bounds& other) {
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-        bounds[0][axis] = std::min(bounds[0][axis], other[0][axis]);
-        bounds[1][axis] = std::max(bounds[1][axis], other[1][axis]);
-    }
-}
-
 }  // namespace
 
 template <class Real>
@@ -115,7 +108,7 @@ bool PartMover<Real>::move(Bvh& bvh, const Mesh<Real>& mesh, std::size_t i, Thre
     const Bounds own = find_bounds(part.of(mesh), threads);
     Bounds all = own;
     for (const Part& other : parts_)
-        if (&other != &part) grow(all, other.bounds);
+        if (&other != &part) grow(all, other.bounds[0], other.bounds[1]);
     if (!bvh.move_bounds<Real>(all)) return false;
 
     // From here on nothing throws.

@@ -56,6 +56,11 @@ Array<Real> copy_of(const Array<Real>& array) {
     return copy;
 }
 
+// Whether as few refer to what traces and to the tree as to those of a scene that nobody uses.
+bool is_unused(const Held& held, const Held& alike) {
+    return as_few_refer(held.tracer, alike.tracer) && as_few_refer(held.bvh, alike.bvh);
+}
+
 // As check_mesh has it.
 template <class Real>
 bool are_in_range(std::span<const Real> coordinates) {
@@ -68,7 +73,7 @@ template <class Real>
 bool move_part(const py::tuple& holders, const py::tuple& alike, const Array<Real>& rows, const Offsets& starts,
                std::size_t i, const std::vector<std::string>& forget) {
     const Held held(holders), others(alike);
-    if (!as_few_refer(held.tracer, others.tracer) || !as_few_refer(held.bvh, others.bvh)) return false;
+    if (!is_unused(held, others)) return false;
     PyBvh& bvh = held.bvh.cast<PyBvh&>();
     PartMover<Real>* const mover = bvh.part_mover<Real>();
     if (!mover || !are_in_range(std::span(rows.data(), static_cast<std::size_t>(rows.size())))) return false;
@@ -86,6 +91,7 @@ bool move_part(const py::tuple& holders, const py::tuple& alike, const Array<Rea
     const std::size_t bytes = sizeof(Real) * 3 * (last - first);
     const std::vector<Real> before(to, to + 3 * (last - first));
     const DefaultFloats floats;
+    const Poll uninterrupted(nullptr);  // what this thread's caller raises would leave half of the tree moved
     Threads threads(thread_count(0));
     std::memcpy(to, rows.data(), bytes);
     if (!bvh.move_part<Real>(vertices, *mover, i, threads)) {
@@ -131,6 +137,10 @@ bool PyBvh::move_part(Array<Real> vertices, PartMover<Real>& mover, std::size_t 
 }
 
 void bind_parts(py::module_& m, PyBvhClass& bvh) {
+    m.def(
+        "is_unused",
+        [](const py::tuple& holders, const py::tuple& alike) { return is_unused(Held(holders), Held(alike)); },
+        py::arg("holders"), py::arg("alike"));
     for_each_precision([&]<class Real>(Real) {
         m.def("move_part", &move_part<Real>, py::arg("holders"), py::arg("alike"), array_arg("rows"),
               array_arg("starts"), py::arg("i"), py::arg("forget"));

@@ -35,12 +35,17 @@ def vase(color: Callable[[wive.Hits], np.ndarray], scene: wive.Scene) -> tuple[F
     return figure, ax
 
 
+def measured_vase(name: str, colors: str, low: float, high: float, label: str) -> Figure:
+    """Numbers of the page on parts, one per triangle of the vase."""
+    part = variables_of("parts")
+    figure, _ = vase(by_triangle(part[name], low, high, colors), part["scene"])
+    bar(figure, label, low, high, colors)
+    return figure
+
+
 def thickness() -> Figure:
     """Walls of the vase."""
-    part = variables_of("parts")
-    figure, _ = vase(by_triangle(part["thickness"], 0.05, 0.2, "viridis"), part["scene"])
-    bar(figure, "wall", 0.05, 0.2, "viridis")
-    return figure
+    return measured_vase("thickness", "viridis", 0.05, 0.2, "wall")
 
 
 def undercut() -> Figure:
@@ -56,10 +61,7 @@ def undercut() -> Figure:
 
 def occlusion() -> Figure:
     """How open the vase's surface is."""
-    part = variables_of("parts")
-    figure, _ = vase(by_triangle(part["open_to_sky"], 0, 1, "gray"), part["scene"])
-    bar(figure, "open", 0, 1, "gray")
-    return figure
+    return measured_vase("open_to_sky", "gray", 0, 1, "open")
 
 
 def xray() -> Figure:

@@ -157,7 +157,7 @@ class HitFile:
         if not keep:
             self._remove()
             return ""
-        self._close()
+        self.close()
         shown = one_line(self.part)
         return f"{self.done:,} of {self._count:,} rays are kept in {shown}: resume to go on, or delete it"
 
@@ -172,12 +172,12 @@ class HitFile:
             self._lock = os.open(self.part, os.O_RDONLY)
             fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
-            self._close()
+            self.close()
             raise OSError(f"{one_line(self.part)}: another run is writing there: wait for its end") from None
         except OSError as error:
             raise named_error(error, self.part) from error
         if not {STATE, CONTENT}.issuperset(os.listdir(self.part)):
-            self._close()
+            self.close()
             raise FileExistsError(f"folder {self.part!r} is in the way: choose another output, or move it")
         state = self._state()
         if state is None:
@@ -191,7 +191,7 @@ class HitFile:
                 )
             self._expect_common(state["about"], f"{one_line(self.part)}: the interrupted run")
         except BaseException:
-            self._close()
+            self.close()
             raise
         self._goes_on = True
         self.done, self._rows, self.hits = state["done"], state["rows"], state["hits"]
@@ -312,21 +312,18 @@ class HitFile:
             "delete it, or choose another output"
         )
 
-    def _close(self) -> None:
+    def close(self) -> None:
+        """Let go of the folder, as it is."""
         for file in {*self._files.values(), self._lock} - {-1}:
             os.close(file)
         self._files, self._lock = {}, -1
-
-    def close(self) -> None:
-        """Let go of the folder, as it is."""
-        self._close()
 
     def _remove(self) -> None:
         """Remove the folder."""
         with suppress(OSError):
             os.unlink(os.path.join(self.part, STATE))
         shutil.rmtree(self.part, ignore_errors=True)
-        self._close()
+        self.close()
 
 
 def is_empty_folder(path: str) -> bool:

@@ -52,18 +52,16 @@ def make_known(vertices: Floats, faces: NDArray[np.int32], place: Place | None, 
     return token
 
 
-def know_again(vertices: Floats, faces: NDArray[np.int32], token: str) -> None:
-    """Give the mesh of an unpickled scene the token that it was pickled with."""
-    _names.pop(id(vertices), None)
-    make_known(vertices, faces, None, token)
+def know_again(vertices: Floats, faces: NDArray[np.int32], token: str = "") -> None:
+    """Give a mesh another token in place of the one it has.
 
-
-def rename(vertices: Floats, faces: NDArray[np.int32]) -> None:
-    """Give a mesh that has moved in place another token: pickled hits of before don't find it."""
+    The one that it was pickled with; or a new one if it has moved in place, so that hits pickled before don't
+    find it.
+    """
     name = _names.pop(id(vertices), None)
     if name is not None:
         _meshes.pop(name.token, None)
-    make_known(vertices, faces, None)
+    make_known(vertices, faces, None, token)
 
 
 def mesh_of(name: MeshName) -> tuple[Floats, NDArray[np.int32]] | None:

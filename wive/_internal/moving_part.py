@@ -10,7 +10,7 @@ import numpy as np
 
 from wive import _cpu
 from wive._internal.cpu_tracer import CpuTracer
-from wive._internal.known_meshes import rename
+from wive._internal.known_meshes import know_again
 from wive._internal.precision import Floats
 
 if TYPE_CHECKING:
@@ -31,13 +31,15 @@ def move_in_place(scene: Scene, i: int, rows: Floats) -> bool:
         return False
     if not isinstance(scene._tracer, CpuTracer):
         return False
-    scene._tracer.bvh.prepare_part(faces, i)
     alike = _unused_scene(scene.precision, scene.backend)
     # Each object is referred to by the scene and by the tuple. No name here holds one meanwhile.
+    if not _cpu.is_unused(_held(scene), _held(alike)):  # `move_part` asks again: preparing takes a while
+        return False
+    scene._tracer.bvh.prepare_part(faces, i)
     starts, computed = scene.geoms.vertices, CpuTracer.COMPUTED
     if not _cpu.move_part(_held(scene), _held(alike), rows, starts, i, computed):
         return False
-    rename(scene.vertices, scene.faces)
+    know_again(scene.vertices, scene.faces)
     return True
 
 

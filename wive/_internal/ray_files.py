@@ -75,14 +75,14 @@ class RayReader:
     ) -> None:
         """`taken` makes rays of rows of the sources; `kind` says of what dtypes and shapes these are."""
         self.count, self.kind = count, kind
-        self.checksums = [RunningChecksum() for _ in sources]
+        self._checksums = [RunningChecksum() for _ in sources]
         self._sources, self._taken = sources, taken
 
     def read(self, count: int, checksummed: bool = False) -> Rays:
-        """The next rays, and `checksums` of all before, if that is so since the first."""
+        """The next rays. They count in `checksum` if all before did."""
         blocks = [source.read(count) for source in self._sources]
         if checksummed:
-            for checksum, block in zip(self.checksums, blocks, strict=True):
+            for checksum, block in zip(self._checksums, blocks, strict=True):
                 checksum.add(block)
         return self._taken(blocks)
 
@@ -94,7 +94,7 @@ class RayReader:
     @property
     def checksum(self) -> list[str]:
         """Of all rays read, of each array."""
-        return [checksum.text for checksum in self.checksums]
+        return [checksum.text for checksum in self._checksums]
 
 
 class RunningChecksum:

@@ -46,46 +46,13 @@ class DaskAllHits(HitCollection):
                 "rays must be in chunks of known sizes to be numbered: call compute_chunk_sizes() on them"
             )
         first = da.from_array(np.cumsum([0, *sizes[:-1]], dtype=np.int64), chunks=1)
-        rays = self._per_hit("ray", np.int64)
+        rays = self._each("ray", np.int64)
         added: da.Array = da.blockwise(
             np.add, (0,), rays, (0,), first, (0,), dtype=np.int64, meta=rays._meta, align_arrays=False
         )
         return added
 
-    @property
-    def t(self) -> da.Array:
-        """(h,) float32 or float64 distances in multiples of the direction's length."""
-        return self._per_hit("t", self._scene.vertices.dtype)
-
-    @property
-    def prim(self) -> da.Array:
-        """(h,) int32 triangles."""
-        return self._per_hit("prim", np.int32)
-
-    @property
-    def uv(self) -> da.Array:
-        """(h,2) float32 or float64 barycentrics."""
-        return self._per_hit("uv", self._scene.vertices.dtype, 2)
-
-    @property
-    def geom(self) -> da.Array:
-        """(h,) int32 meshes of `Scene.from_meshes`."""
-        return self._per_hit("geom", np.int32)
-
-    @property
-    def geom_prim(self) -> da.Array:
-        """(h,) int32 triangles as rows of their own meshes."""
-        return self._per_hit("geom_prim", np.int32)
-
-    def points(self) -> da.Array:
-        """(h,3) float64 points from the barycentrics."""
-        return self._per_hit("points", np.float64, 3, of_mesh=True)
-
-    def normals(self) -> da.Array:
-        """(h,3) float64 unit normals."""
-        return self._per_hit("normals", np.float64, 3, of_mesh=True)
-
-    def _per_hit(self, name: str, dtype: Any, columns: int | None = None, of_mesh: bool = False) -> da.Array:
+    def _each(self, name: str, dtype: Any, columns: int | None = None, *, of_mesh: bool = False) -> da.Array:
         unknown = (math.nan,) * math.prod(self._hits.numblocks)
         return self._read(name, dtype, columns, of_mesh=of_mesh, adjust_chunks={0: unknown})
 

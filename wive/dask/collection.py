@@ -6,6 +6,7 @@ import copy
 from typing import Any
 
 import dask.array as da
+import numpy as np
 from dask.base import DaskMethodsMixin
 from dask.delayed import Delayed
 
@@ -21,13 +22,51 @@ TRACED = "t", "prim", "uv"
 class HitCollection(DaskMethodsMixin):
     """Hits that dask computes, chunk by chunk; arrays of them share the trace of a chunk.
 
-    `_hits` is an array in form alone: its chunks hold hits, not numbers.
+    `_hits` is an array in form alone: its chunks hold hits, not numbers. Arrays of all hits have a row
+    per hit, (h,) in place of (n,), and no misses.
     """
 
     def __init__(self, hits: da.Array, rays: ChunkedRays, scene: Scene, carried: Delayed) -> None:
         """Keep what arrays are made of."""
         self._hits, self._meta, self._carried = hits, rays.meta, carried
         self._scene = scene
+
+    @property
+    def t(self) -> da.Array:
+        """(n,) float32 or float64 distances in multiples of the direction's length; inf on a miss."""
+        return self._each("t", self._scene.vertices.dtype)
+
+    @property
+    def prim(self) -> da.Array:
+        """(n,) int32 triangles; -1 on a miss."""
+        return self._each("prim", np.int32)
+
+    @property
+    def uv(self) -> da.Array:
+        """(n,2) float32 or float64 barycentrics; NaN on a miss."""
+        return self._each("uv", self._scene.vertices.dtype, 2)
+
+    @property
+    def geom(self) -> da.Array:
+        """(n,) int32 meshes of `Scene.from_meshes`; -1 on a miss."""
+        return self._each("geom", np.int32)
+
+    @property
+    def geom_prim(self) -> da.Array:
+        """(n,) int32 triangles as rows of their own meshes; -1 on a miss."""
+        return self._each("geom_prim", np.int32)
+
+    def points(self) -> da.Array:
+        """(n,3) float64 points from the barycentrics; NaN on a miss."""
+        return self._each("points", np.float64, 3, of_mesh=True)
+
+    def normals(self) -> da.Array:
+        """(n,3) float64 unit normals; NaN on a miss."""
+        return self._each("normals", np.float64, 3, of_mesh=True)
+
+    def _each(self, name: str, dtype: Any, columns: int | None = None, *, of_mesh: bool = False) -> da.Array:
+        """An array of one row per ray, or per hit if there may be several."""
+        return self._read(name, dtype, columns, of_mesh=of_mesh)
 
     def _read(
         self,

@@ -31,34 +31,9 @@ class DaskHits(HitCollection):
     """
 
     @property
-    def t(self) -> da.Array:
-        """(n,) float32 or float64 distances in multiples of the direction's length; inf on a miss."""
-        return self._read("t", self._scene.vertices.dtype)
-
-    @property
-    def prim(self) -> da.Array:
-        """(n,) int32 triangles; -1 on a miss."""
-        return self._read("prim", np.int32)
-
-    @property
-    def uv(self) -> da.Array:
-        """(n,2) float32 or float64 barycentrics; NaN on a miss."""
-        return self._read("uv", self._scene.vertices.dtype, 2)
-
-    @property
     def mask(self) -> da.Array:
         """(n,) bool, true if the ray hit something."""
         return self._read("mask", np.bool_)
-
-    @property
-    def geom(self) -> da.Array:
-        """(n,) int32 meshes of `Scene.from_meshes`; -1 on a miss."""
-        return self._read("geom", np.int32)
-
-    @property
-    def geom_prim(self) -> da.Array:
-        """(n,) int32 triangles as rows of their own meshes; -1 on a miss."""
-        return self._read("geom_prim", np.int32)
 
     @property
     def front(self) -> da.Array:
@@ -69,14 +44,6 @@ class DaskHits(HitCollection):
     def error_bound(self) -> da.Array:
         """(n,) float64 upper bounds on the error of t; NaN on a miss."""
         return self._read("error_bound", np.float64, of_mesh=True)
-
-    def points(self) -> da.Array:
-        """(n,3) float64 points from the barycentrics; NaN on a miss."""
-        return self._read("points", np.float64, 3, of_mesh=True)
-
-    def normals(self) -> da.Array:
-        """(n,3) float64 unit normals; NaN on a miss."""
-        return self._read("normals", np.float64, 3, of_mesh=True)
 
     def cosines(self) -> da.Array:
         """(n,) float64 |normal . direction| / |direction|; NaN on a miss."""
