@@ -12,14 +12,14 @@
 
 namespace wive {
 
-// Knows where in a tree each mesh's triangles are, so that it serves one tree and what that becomes by its own moves.
+// Keeps where in a tree the triangles of each mesh are. It serves one tree, which nothing else may change.
 template <class Real>
 class PartMover {
 public:
     // first_faces: where the faces of each mesh begin, and how many there are; ascending.
     PartMover(const Mesh<Real>& mesh, std::span<const std::int32_t> first_faces, Threads& threads);
 
-    // Looks for the leaves of part i, if it has not been done.
+    // Finds the leaves of part i, unless they are known.
     void prepare(const Bvh& bvh, std::size_t i, Threads& threads);
 
     // Refits `bvh` to where the mesh's part i is now; all others must be where they were. No query may use the tree

@@ -36,7 +36,7 @@ bool as_few_refer(const py::object& object, const py::object& alike) {
     return Py_REFCNT(object.ptr()) == Py_REFCNT(alike.ptr());
 }
 
-// Whether nobody but the array itself sees its memory change.
+// Whether no other array or object shows the memory of `vertices`.
 bool owns_data(const py::object& vertices, const py::object& alike) {
     if (!as_few_refer(vertices, alike)) return false;
     const auto array = py::reinterpret_borrow<py::array>(vertices);
@@ -86,7 +86,7 @@ bool move_part(const py::tuple& holders, const py::tuple& alike, const Array<Rea
                static_cast<std::size_t>(rows.shape(0)) == last - first && rows.shape(1) == 3,
            "rows: expected as many as the mesh has vertices");
     if (!in_place) vertices = copy_of(vertices);
-    // The memory is a NumPy array's, which only Python is kept from writing to.
+    // The array is read-only for Python alone: its memory can be written to.
     Real* const to = const_cast<Real*>(vertices.data()) + 3 * first;
     const std::size_t bytes = sizeof(Real) * 3 * (last - first);
     const std::vector<Real> before(to, to + 3 * (last - first));

@@ -23,8 +23,8 @@ MOST_FACES = 1 << 20
 def move_in_place(scene: Scene, i: int, rows: Floats) -> bool:
     """Whether mesh `i` of the scene has its vertices at `rows` now; if not, nothing has changed.
 
-    A tree that others use stays as it is: queries that run, copies of the scene, arrays that show its memory.
-    Hits that are alive keep the old positions, which takes a copy of the vertices.
+    The tree stays as it is if queries run, or if copies of the scene or arrays of its memory are alive. If
+    hits are alive, which show the old positions, the vertices are copied.
     """
     faces = scene.geoms.faces
     if not _counts_references() or faces[i + 1] - faces[i] > MOST_FACES:
