@@ -139,6 +139,12 @@ def test_no_rays_and_one_ray_tell_the_end(count):
     assert told == [(count, count)]
 
 
+def test_no_rays_of_a_shared_direction_are_none():
+    told = []
+    SCENE.intersect(np.zeros((0, 3)), [0, 0, 1], progress=lambda done, total: told.append((done, total)))
+    assert told == [(0, 0)]
+
+
 @pytest.mark.parametrize("name", ["scene.wive", "scene.npz"])
 def test_saving_and_loading_tell_how_far_they_are(tmp_path, name):
     told: list[tuple[int, int]] = []

@@ -70,7 +70,7 @@ def rays_of_numpy(origins: Any, directions: Any, tmin: Any, tmax: Any) -> Rays:
 
 def ray_count(*values: ArrayLike) -> int:
     """How many rays origins and directions, and what else, are for; 0 if they are no arrays of vectors."""
-    counts = [0]
+    leadings = []
     for value in values:
         library = library_of(value)
         try:
@@ -78,8 +78,9 @@ def ray_count(*values: ArrayLike) -> int:
         except (TypeError, ValueError):  # the query says what is wrong
             continue
         if columns == 3:
-            counts.append(math.prod(leading))
-    return max(counts)
+            leadings.append(leading)
+    counts = [math.prod(leading) for leading in leadings if leading]
+    return max(counts, default=min(1, len(leadings)))  # one vector alone is that of all rays
 
 
 def check_rays(
