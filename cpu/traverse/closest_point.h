@@ -234,7 +234,8 @@ void find_closest(const BvhView& bvh, const PointBatch<typename I::Real>& points
                 next = end;
                 return false;
             }
-            if (flight.start(bvh, points, flight.index = next)) break;
+            flight.index = next;
+            if (flight.start(bvh, points, next)) break;
             Flight::write_none(out, next);
         }
         ++next;
