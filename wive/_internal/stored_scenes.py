@@ -39,7 +39,10 @@ class Place(NamedTuple):
         return f"{how}({one_line(self.name)!r})"
 
     def open(self) -> _cpu.Bvh:
-        """The tree; OSError if it is not there, ValueError if it has changed."""
+        """The tree, if not yet held: OSError if it is not there, ValueError if it has changed."""
+        held = _held.get(self)
+        if held is not None:
+            return held
         try:
             bvh = open_file(self.name) if self.kind == "file" else open_shared(self.name)
         except FileNotFoundError:
