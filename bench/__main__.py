@@ -21,6 +21,7 @@ BENCHES = {
     "paper": "the WiVe paper's tables: path tracing with its traversals and with Embree's",
     "packets": "pictures from near and far with packets, over the same without",
     "pareto": "speed against leaks, wrong triangles and the error of t, with Embree and Warp",
+    "peers": "tinybvh and madmann91/bvh, compiled from their sources, against wive",
     "python": "embreex, trimesh, Warp and wive from Python, NumPy arrays in and out",
     "quality": 'what quality="high" saves in steps per ray and costs in build time',
     "stream": "rays of files in pieces, to files, over one batch in memory, all cores",
