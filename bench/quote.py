@@ -265,6 +265,29 @@ def dask_speed(content: report.Row) -> str:
     return markdown(["two cores", "speed", "quartiles", "Mray/s"], lines)
 
 
+def peers_means(content: report.Row) -> str:
+    """Speed over other libraries' trees: geometric mean over the scenes, and lowest."""
+    ways = ("watertight", "fast", "one_ray")
+    lines = []
+    for peer, builder, rays in distinct(content["rows"], "peer", "builder", "rays"):
+        rows = where(content["rows"], peer=peer, builder=builder, rays=rays)
+        ratios = [[float(row[way]) for row in rows] for way in ways]
+        lines.append(
+            [peer, builder, rays, *(f"{geometric_mean(found):.2f} ({min(found):.2f})" for found in ratios)]
+        )
+    heads = ["`watertight`, batch", "`fast`, batch", "`fast`, one ray"]
+    return markdown(["peer", "its builder", "rays", *heads], lines, texts=3)
+
+
+def peers_builds(content: report.Row) -> str:
+    """Building by other libraries: their seconds over wive's."""
+    lines = [
+        [row["scene"], f"{row['triangles']:,}", row["peer"], f"{row['usual']:.2f}", f"{row['high']:.2f}"]
+        for row in content["builds"]
+    ]
+    return markdown(["scene", "triangles", "peer", "usual / medium", "high / high"], lines)
+
+
 TABLES: dict[str, Table] = {
     "embree.avx512_in_flight": embree_speed("avx512", "tuned"),
     "embree.avx512_one_ray": embree_speed("avx512", 1),
@@ -280,6 +303,8 @@ TABLES: dict[str, Table] = {
     "order.means": order_means,
     "order.scenes": order_scenes,
     "dask.speed": dask_speed,
+    "peers.means": peers_means,
+    "peers.builds": peers_builds,
     "pareto.means": pareto_means,
     "pareto.scenes": pareto_scenes,
 }
