@@ -26,6 +26,7 @@ BENCHES = {
     "quality": 'what quality="high" saves in steps per ray and costs in build time',
     "stream": "rays of files in pieces, to files, over one batch in memory, all cores",
     "gpu-prepare": "not a bench: packs Warp and scenes for a GPU machine without a package index",
+    "draw": "not a bench: draws the figures of bench/results again",
     "quote": "not a bench: writes the tables of docs/benchmarks.md from bench/results",
     "convert": "not a bench: makes a scene file of meshes in other formats",
 }

@@ -11,8 +11,6 @@ import argparse
 import resource
 from collections.abc import Sequence
 
-import matplotlib
-
 from bench.contenders.build_race import build_rows, tree_row
 from bench.contenders.native_embree import Isa
 from bench.support import report
@@ -20,10 +18,6 @@ from bench.support.options import QUALITIES, listed, numbers, scene_parser
 from bench.support.scenes import SceneFolder
 from bench.support.timing import Effort, core_count
 from wive import _cpu
-
-matplotlib.use("Agg")
-from matplotlib import pyplot
-from matplotlib.figure import Figure
 
 # Two families, each from small to large.
 USUAL = (
@@ -81,46 +75,12 @@ def main(options: Sequence[str]) -> None:
     print(f"\npeak memory of this process: {peak:.1f} GiB")
     content = {"isa": isa, "peak_gib": peak, "build": build, "trees": trees}
     whole = scenes.whole and not (chosen.quick or chosen.quality or chosen.threads != default_threads())
-    report.save("build", content, draw(build), chosen.out, whole=whole)
+    report.save("build", content, chosen.out, whole=whole)
 
 
 def default_threads() -> tuple[int, ...]:
     """One thread, and one per core."""
     return tuple(dict.fromkeys((1, core_count())))
-
-
-def draw(build: Sequence[report.Row]) -> Figure:
-    """Nanoseconds per triangle, and the ratio, over triangles: a line per family, quality and threads."""
-    figure, (cost, ratio) = pyplot.subplots(1, 2, figsize=(11, 4.6), layout="constrained")
-    keys = list(dict.fromkeys((_family(row), row["quality"], row["threads"]) for row in build))
-    for i, key in enumerate(keys):
-        rows = [row for row in build if (_family(row), row["quality"], row["threads"]) == key]
-        triangles = [row["triangles"] for row in rows]
-        family, quality, threads = key
-        label = f"{family}, {quality}, {threads} thread{'s' * (threads > 1)}"
-        cost.plot(
-            triangles, [row["wive_ns_per_triangle"] for row in rows], marker="o", markersize=3, color=f"C{i}",
-            label=label,
-        )  # fmt: skip
-        cost.plot(
-            triangles,
-            [row["embree_ns_per_triangle"] for row in rows],
-            linestyle="--",
-            linewidth=1,
-            color=f"C{i}",
-        )
-        ratio.plot(triangles, [row["ratio"] for row in rows], marker="o", markersize=3, color=f"C{i}")
-    ratio.axhline(1.0, color="0.4", linewidth=1)
-    cost.set_ylabel("nanoseconds per triangle; dashed: Embree")
-    ratio.set_ylabel("Embree's seconds over wive's")
-    for panel in (cost, ratio):
-        panel.set_xscale("log")
-        panel.set_xlabel("triangles")
-        panel.set_ylim(bottom=0)
-        panel.grid(color="0.92", linewidth=0.8)
-        panel.spines[["top", "right"]].set_visible(False)
-    cost.legend(frameon=False, fontsize=8)
-    return figure
 
 
 def _family(row: report.Row) -> str:

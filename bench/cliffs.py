@@ -9,7 +9,6 @@ Embree's robust single rays. `bar`: what `ratio` may be at most. Everything runs
 import argparse
 from collections.abc import Callable, Sequence
 
-import matplotlib
 import numpy as np
 
 import wive
@@ -20,10 +19,6 @@ from bench.support.options import scene_parser
 from bench.support.scenes import Mesh, SceneFolder
 from bench.support.timing import QUICK, Effort, compare, one_core, timed
 from wive import _cpu
-
-matplotlib.use("Agg")
-from matplotlib import pyplot, ticker
-from matplotlib.figure import Figure
 
 LEVELS, QUICK_LEVELS = 7, 4  # 20 * 4^levels triangles of the ball
 RAYS, QUICK_RAYS = 3000, 300
@@ -55,7 +50,7 @@ def main(options: Sequence[str]) -> None:
     above = [row for row in rows if row["ratio"] > row["bar"]]
     print(f"{len(above)} of {len(rows)} above their bar")
     content = {"backend": backend(), "above": len(above), "rows": rows}
-    report.save("cliffs", content, draw(rows), chosen.out, whole=scenes.whole and not chosen.quick)
+    report.save("cliffs", content, chosen.out, whole=scenes.whole and not chosen.quick)
 
 
 def backend() -> str:
@@ -130,30 +125,6 @@ def misses(mesh: Mesh, count: int, effort: Effort) -> list[report.Row]:
                 }
             )
     return rows
-
-
-def draw(rows: Sequence[report.Row]) -> Figure:
-    """The ratio of every input over its bar, one line each."""
-    figure, axes = pyplot.subplots(figsize=(8, 1 + 0.19 * len(rows)), layout="constrained")
-    parts = list(dict.fromkeys(row["part"] for row in rows))
-    places = np.arange(len(rows))[::-1]
-    for i, part in enumerate(parts):
-        of_part = [k for k, row in enumerate(rows) if row["part"] == part]
-        axes.plot(
-            [rows[k]["ratio"] / rows[k]["bar"] for k in of_part], places[of_part], "o", markersize=4,
-            color=f"C{i}", label=part,
-        )  # fmt: skip
-    axes.axvline(1, color="0.4", linewidth=0.8)
-    axes.set_xscale("log")
-    axes.xaxis.set_major_locator(ticker.LogLocator(subs=(1, 2, 5)))
-    axes.xaxis.set_major_formatter(ticker.StrMethodFormatter("{x:g}"))
-    axes.xaxis.set_minor_locator(ticker.NullLocator())
-    axes.set_yticks(places, [row["case"] for row in rows], fontsize=7)
-    axes.set_xlabel("seconds per ray over a usual input's / what they may be at most")
-    axes.grid(axis="x", color="0.92", linewidth=0.8)
-    axes.spines[["top", "right"]].set_visible(False)
-    axes.legend(frameon=False, fontsize=8)
-    return figure
 
 
 def parse_options(options: Sequence[str]) -> argparse.Namespace:

@@ -10,7 +10,6 @@ import argparse
 from collections.abc import Callable, Sequence
 from typing import Any
 
-import matplotlib
 import numpy as np
 
 import wive
@@ -18,10 +17,6 @@ from bench.support import report
 from bench.support.options import scene_parser
 from bench.support.scenes import SceneFolder
 from bench.support.timing import QUICK, Effort, compare, one_core, timed
-
-matplotlib.use("Agg")
-from matplotlib import pyplot
-from matplotlib.figure import Figure
 
 USUAL = ("living_room", "city_san_francisco", "terrain_jacksboro", "bmw_m6")
 QUICK_SCENES = ("terrain_2k",)
@@ -51,7 +46,7 @@ def main(options: Sequence[str]) -> None:
     )
     content = {"rows": rows, "contains": insides}
     whole = scenes.whole and not chosen.quick
-    report.save("closest", content, draw(rows), chosen.out, whole=whole)
+    report.save("closest", content, chosen.out, whole=whole)
 
 
 def row_of(
@@ -127,25 +122,6 @@ def inside_row(level: int, count: int, effort: Effort) -> report.Row:
         "wive_seconds": found.our_seconds,
         "contains": found.ratio,
     }
-
-
-def draw(rows: Sequence[report.Row]) -> Figure:
-    """Ratios by scene and kind of points."""
-    figure, axes = pyplot.subplots(figsize=(8, 4), layout="constrained")
-    labels = [f"{row['scene']}\n{row['kind']}" for row in rows]
-    for i, library in enumerate(("open3d", "trimesh")):
-        known = [(k, row[library]) for k, row in enumerate(rows) if row.get(library) is not None]
-        if known:
-            places, ratios = zip(*known, strict=True)
-            axes.bar(np.add(places, 0.35 * i - 0.2), ratios, width=0.33, label=library)
-    axes.axhline(1.0, color="0.4", linewidth=1)
-    axes.set_yscale("log")
-    axes.set_xticks(range(len(rows)), labels, fontsize=7)
-    axes.set_ylabel("their seconds over wive's")
-    axes.spines[["top", "right"]].set_visible(False)
-    if axes.get_legend_handles_labels()[0]:
-        axes.legend(frameon=False)
-    return figure
 
 
 def parse_options(options: Sequence[str]) -> argparse.Namespace:

@@ -14,7 +14,6 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-import matplotlib
 import numpy as np
 from numpy.typing import NDArray
 
@@ -23,10 +22,6 @@ from bench.support import report
 from bench.support.options import scene_parser
 from bench.support.scenes import TERRAIN, SceneFolder
 from bench.support.timing import QUICK, Effort, compare_in_turn, wall_timed
-
-matplotlib.use("Agg")
-from matplotlib import pyplot
-from matplotlib.figure import Figure
 
 CORES = 2
 RAYS, CHUNK = 20_000_000, 1_000_000
@@ -79,7 +74,7 @@ def main(options: Sequence[str]) -> None:
     )
     whole = scenes.whole and not chosen.quick
     content = {"task_ms": task_ms, "making_ns": making_ns, "rows": rows}
-    report.save("dask", content, draw(rows), chosen.out, whole=whole)
+    report.save("dask", content, chosen.out, whole=whole)
 
 
 @contextmanager
@@ -157,18 +152,6 @@ def random_vectors(
     if kind == "directions":
         return random.standard_normal(shape, np.float32)
     return np.asarray(low + (high - low) * random.random(shape, np.float32), np.float32)
-
-
-def draw(rows: Sequence[report.Row]) -> Figure:
-    """Bars of Mray/s."""
-    figure, axes = pyplot.subplots(figsize=(6, 2.5), layout="constrained")
-    for row in rows:
-        bar = axes.barh(f"{row['scene']}, {row['contender']}", row["mrays"], color="tab:blue")
-        axes.bar_label(bar, [f"{row['speed']:.2f}"], padding=3)
-    axes.invert_yaxis()
-    axes.set_xlabel("Mray/s; beside the bars: over one call of the scene")
-    axes.margins(x=0.15)
-    return figure
 
 
 def parse_options(options: Sequence[str]) -> argparse.Namespace:

@@ -15,7 +15,6 @@ from itertools import product
 from bench.contenders.build_race import build_rows, tree_row
 from bench.contenders.compiled_shim import BenchError
 from bench.contenders.embree_race import TUNED, Contender, packet_rows, speed_rows
-from bench.figures.embree_figure import draw
 from bench.support import report
 from bench.support.options import ACCURACIES, NODES, in_flights, listed, scene_parser
 from bench.support.rays import KINDS, recorded_rays
@@ -108,7 +107,7 @@ def main(options: Sequence[str]) -> None:
         "trees": trees,
     }
     whole = scenes.whole and is_whole(chosen, kernels)
-    report.save("embree", content, draw(speed) if speed else None, chosen.out, whole=whole)
+    report.save("embree", content, chosen.out, whole=whole)
 
 
 def mean_rows(speed: Sequence[report.Row]) -> list[report.Row]:

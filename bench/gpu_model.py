@@ -47,7 +47,7 @@ def main(options: Sequence[str]) -> None:
             report.print_table(rows[-len(found) :], COLUMNS)
     report.print_table(rows, COLUMNS, "Counts per ray; ratios above 1: wive needs less")
     whole = not chosen.quick and not chosen.scenes and not scenes.missing
-    report.save("gpu_model", {"rows": rows}, None, chosen.out, whole=whole)
+    report.save("gpu_model", {"rows": rows}, chosen.out, whole=whole)
 
 
 def parse_options(options: Sequence[str]) -> argparse.Namespace:

@@ -13,7 +13,6 @@ import ctypes
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-import matplotlib
 import numpy as np
 
 from bench.contenders.compiled_shim import BenchError, compiled
@@ -23,10 +22,6 @@ from bench.support.rays import KINDS, Rays, recorded_rays
 from bench.support.scenes import LARGEST, Mesh, SceneFolder
 from bench.support.timing import Effort, compare_in_turn, one_core, timed
 from wive import _cpu
-
-matplotlib.use("Agg")
-from matplotlib import pyplot
-from matplotlib.figure import Figure
 
 IN_FLIGHT = (1, 2, 4, 8, 12, 16, 24, 32, 48, 64)
 RAY_KINDS = ("diffuse", "random")
@@ -72,7 +67,7 @@ def main(options: Sequence[str]) -> None:
         "rows": rows,
         "best": best,
     }
-    report.save("inflight", content, draw(rows), chosen.out, whole=whole and chosen.rays == RAY_KINDS)
+    report.save("inflight", content, chosen.out, whole=whole and chosen.rays == RAY_KINDS)
 
 
 def best_kernel() -> str:
@@ -145,42 +140,6 @@ def best_rows(rows: Sequence[report.Row]) -> list[report.Row]:
         tuned = next(row for row in group if row["in_flight"] == "tuned")
         best.append({**winner, "best": winner["in_flight"], "tuned": tuned["speedup"]})
     return best
-
-
-def draw(rows: Sequence[report.Row]) -> Figure:
-    """Above: Mray/s over rays in flight, dashed the limit by DRAM latency. Below: the latency of a ray."""
-    kinds = list(dict.fromkeys(row["rays"] for row in rows))
-    scenes = list(dict.fromkeys(row["scene"] for row in rows))
-    figure, panels = pyplot.subplots(
-        2, len(kinds), figsize=(1.5 + 4.2 * len(kinds), 8), sharex=True, sharey="row", squeeze=False,
-        layout="constrained",
-    )  # fmt: skip
-    for column, kind in enumerate(kinds):
-        speed, latency = panels[0][column], panels[1][column]
-        for i, scene in enumerate(scenes):
-            chosen = [
-                row for row in rows
-                if (row["rays"], row["scene"]) == (kind, scene) and row["in_flight"] != "tuned"
-            ]  # fmt: skip
-            flights, mrays, limit, waits = (
-                [row[name] for row in chosen] for name in ("in_flight", "mrays", "limit_mrays", "latency_ns")
-            )
-            label = f"{scene}: {chosen[0]['triangles']:,} triangles"
-            speed.plot(flights, mrays, marker="o", markersize=3, color=f"C{i}", label=label)
-            speed.plot(flights, limit, linestyle="--", linewidth=0.8, color=f"C{i}")
-            latency.plot(flights, waits, marker="o", markersize=3, color=f"C{i}")
-        speed.set_title(f"{kind} rays", fontsize=10)
-        latency.set_xlabel("rays in flight on one thread")
-    panels[0][0].set_ylabel("Mray/s; dashed: one DRAM latency per step")
-    panels[1][0].set_ylabel("latency of a ray, nanoseconds")
-    for panel in panels.flat:
-        panel.set_xscale("log", base=2)
-        panel.set_yscale("log")
-        panel.grid(color="0.92", linewidth=0.8)
-        panel.spines[["top", "right"]].set_visible(False)
-    handles, labels = panels[0][0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=2, frameon=False, fontsize=8)
-    return figure
 
 
 def parse_options(options: Sequence[str]) -> argparse.Namespace:

@@ -17,7 +17,6 @@ import numpy as np
 
 from bench.contenders.compiled_shim import BenchError
 from bench.contenders.latency_contenders import Call, Contender, LaneForm, contenders
-from bench.figures.latency_figure import draw
 from bench.support import report
 from bench.support.options import listed, scene_parser
 from bench.support.rays import KINDS, Rays, recorded_rays
@@ -87,10 +86,9 @@ def main(options: Sequence[str]) -> None:
         "compare": comparison,
         "means": means,
     }
-    figure = draw(curve) if curve else None
     suffix = f"-{description['name'].replace(' ', '-')}" if device.startswith("cuda") else ""
     whole = scenes.whole and bool(device) and is_whole(chosen)
-    report.save(f"latency{suffix}", content, figure, chosen.out, whole=whole)
+    report.save(f"latency{suffix}", content, chosen.out, whole=whole)
 
 
 def curve_rows(contender: Contender, rays: Rays, quick: bool) -> Iterator[report.Row]:

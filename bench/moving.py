@@ -9,7 +9,6 @@ moved to the second one's place by NumPy, over those through one scene of both m
 import argparse
 from collections.abc import Callable, Sequence
 
-import matplotlib
 import numpy as np
 
 import wive
@@ -18,10 +17,6 @@ from bench.support.options import scene_parser
 from bench.support.rays import random_rays
 from bench.support.scenes import Mesh, SceneFolder, terrain
 from bench.support.timing import QUICK, Effort, compare, wall_timed
-
-matplotlib.use("Agg")
-from matplotlib import pyplot
-from matplotlib.figure import Figure
 
 USUAL = ("city_san_francisco", "bathroom_salledebain", "bmw_m6_tiled_3x2")
 QUICK_SCENES = ("terrain_2k",)
@@ -47,7 +42,7 @@ def main(options: Sequence[str]) -> None:
             report.print_progress(rows[-1], COLUMNS)
     report.print_table(rows, COLUMNS, "One mesh moves")
     whole = scenes.whole and not chosen.quick
-    report.save("moving", {"rows": rows}, draw(rows), chosen.out, whole=whole)
+    report.save("moving", {"rows": rows}, chosen.out, whole=whole)
 
 
 def row_of(mesh: Mesh, count: int, quick: bool) -> report.Row:
@@ -103,22 +98,6 @@ def two_scenes(mesh: Mesh, one: wive.Scene, guest: tuple[np.ndarray, np.ndarray]
     return compare(
         wall_timed(lambda: one.intersect(origins, directions)), wall_timed(through_two), effort
     ).ratio
-
-
-def draw(rows: Sequence[report.Row]) -> Figure:
-    """Milliseconds of each way to move a mesh, by scene and size of the mesh."""
-    figure, axes = pyplot.subplots(figsize=(8, 4), layout="constrained")
-    labels = [f"{row['moving']:,} of\n{row['triangles']:,}" for row in rows]
-    ways = {"geom_ms": "refit(geom=)", "refit_ms": "refit of all", "build_ms": "new scene"}
-    for i, (column, label) in enumerate(ways.items()):
-        axes.bar(np.arange(len(rows)) + 0.27 * (i - 1), [row[column] for row in rows], 0.25, label=label)
-    axes.set_yscale("log")
-    axes.set_xticks(range(len(rows)), labels, fontsize=7)
-    axes.set_xlabel("triangles that move, and of the whole scene")
-    axes.set_ylabel("milliseconds")
-    axes.spines[["top", "right"]].set_visible(False)
-    axes.legend(frameon=False)
-    return figure
 
 
 def parse_options(options: Sequence[str]) -> argparse.Namespace:

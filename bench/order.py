@@ -23,7 +23,6 @@ from bench.contenders import order_study
 from bench.contenders.compiled_shim import BenchError
 from bench.contenders.embree_race import TUNED
 from bench.contenders.order_study import SORTING, STORED_ORDERS, Order
-from bench.figures.order_figure import draw
 from bench.support import report
 from bench.support.options import listed, scene_parser
 from bench.support.rays import Rays, recorded_rays
@@ -76,7 +75,7 @@ def main(options: Sequence[str]) -> None:
     report.print_table(speed_means, ["rays", "in_flight", "order", "speed"], "Geometric means")
     whole = scenes.whole and not chosen.quick and set(chosen.rays) == set(KINDS)
     content = {"rows": rows, "means": means, "speed": speed, "speed_means": speed_means}
-    report.save("order", content, draw(rows, speed), chosen.out, whole=whole)
+    report.save("order", content, chosen.out, whole=whole)
 
 
 def scene_rows(mesh: Mesh, trees: Trees, sets: Sequence[Rays]) -> Iterator[report.Row]:

@@ -10,7 +10,6 @@ import argparse
 from collections.abc import Sequence
 from itertools import product
 
-import matplotlib
 import numpy as np
 
 from bench.support import report
@@ -19,10 +18,6 @@ from bench.support.rays import Rays, camera_rays
 from bench.support.scenes import Camera, Mesh, SceneFolder
 from bench.support.timing import Effort, compare_in_turn, one_core, timed
 from wive import _cpu
-
-matplotlib.use("Agg")
-from matplotlib import pyplot
-from matplotlib.figure import Figure
 
 DISTANCES = (0.1, 0.5, 3.0, 30.0, 100.0)  # from the middle of the scene, in diagonals of its bounding box
 WIDTHS = (16, 128, 512, 2048)  # pixels of square pictures
@@ -61,7 +56,7 @@ def main(options: Sequence[str]) -> None:
     report.print_table([summary], list(summary))
     content = {"kernel": kernel, "accuracy": chosen.accuracy, "summary": summary, "rows": rows}
     whole = scenes.whole and not (chosen.quick or chosen.kernel) and chosen.widths == WIDTHS
-    report.save("packets", content, draw(rows), chosen.out, whole=whole)
+    report.save("packets", content, chosen.out, whole=whole)
 
 
 def view(mesh: Mesh, distance: float, width: int) -> Rays:
@@ -99,30 +94,6 @@ def measured(tree: _cpu.Bvh, kernel: str, rays: Rays, query: str, effort: Effort
         "single_ns": single,
         "rounds": outcomes[0].rounds,
     }
-
-
-def draw(rows: Sequence[report.Row]) -> Figure:
-    """The ratio of every view over the camera's distance, a panel per width."""
-    widths = list(dict.fromkeys(row["width"] for row in rows))
-    figure, panels = pyplot.subplots(
-        1, len(widths), figsize=(1 + 2.6 * len(widths), 3.4), sharey=True, squeeze=False, layout="constrained"
-    )
-    for panel, width in zip(panels[0], widths, strict=True):
-        for i, query in enumerate(QUERIES):
-            points = [row for row in rows if (row["width"], row["query"]) == (width, query)]
-            panel.plot(
-                [row["distance"] for row in points], [row["ratio"] for row in points],
-                "o", markersize=3, color=f"C{i}", label=f"{query} hit",
-            )  # fmt: skip
-        panel.axhline(1, color="0.6", linewidth=0.8)
-        panel.set_xscale("log")
-        panel.set_title(f"{width} x {width}", fontsize=10)
-        panel.set_xlabel("distance in diagonals")
-        panel.grid(color="0.92", linewidth=0.8)
-        panel.spines[["top", "right"]].set_visible(False)
-    panels[0][0].set_ylabel("seconds with packets / without")
-    panels[0][0].legend(frameon=False, fontsize=8)
-    return figure
 
 
 def parse_options(options: Sequence[str]) -> argparse.Namespace:

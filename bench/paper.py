@@ -20,7 +20,6 @@ import sys
 import time
 from collections.abc import Iterator, Sequence
 
-import matplotlib
 import numpy as np
 from numpy.typing import NDArray
 
@@ -33,10 +32,6 @@ from bench.support.scenes import Mesh, SceneFolder
 from bench.support.timing import Comparison, geometric_mean, one_core
 from wive import _cpu
 from wive.camera import Camera
-
-matplotlib.use("Agg")
-from matplotlib import pyplot
-from matplotlib.figure import Figure
 
 WIDTH, HEIGHT = 3840, 2160
 QUICK_WIDTH, QUICK_HEIGHT = 192, 108
@@ -89,7 +84,7 @@ def main(options: Sequence[str]) -> None:
         "means": means,
     }
     whole = scenes.whole and is_whole(chosen, kernels)
-    report.save("paper", content, draw(rows), chosen.out, whole=whole)
+    report.save("paper", content, chosen.out, whole=whole)
 
 
 def scene_rows(
@@ -174,43 +169,6 @@ def mean_rows(rows: Sequence[report.Row]) -> list[report.Row]:
             }
         )
     return means
-
-
-def draw(rows: Sequence[report.Row]) -> Figure:
-    """Bars of the gain: a panel per accuracy and kernel, a colour per number of rays in flight."""
-    accuracies = list(dict.fromkeys(row["accuracy"] for row in rows))
-    kernels = list(dict.fromkeys(row["kernel"] for row in rows))
-    flights = list(dict.fromkeys(row["in_flight"] for row in rows))
-    scenes = list(dict.fromkeys(row["scene"] for row in rows))
-    figure, panels = pyplot.subplots(
-        len(accuracies), len(kernels), sharex=True, sharey=True, squeeze=False, layout="constrained",
-        figsize=(2.4 + 3.4 * len(kernels), 0.8 + len(accuracies) * (0.7 + 0.36 * len(scenes))),
-    )  # fmt: skip
-    height = 0.8 / len(flights)
-    for accuracy, line in zip(accuracies, panels, strict=True):
-        for kernel, panel in zip(kernels, line, strict=True):
-            for i, flight in enumerate(flights):
-                gains = {
-                    row["scene"]: row["gain"]
-                    for row in rows
-                    if (row["accuracy"], row["kernel"], row["in_flight"]) == (accuracy, kernel, flight)
-                }
-                places = [scenes.index(scene) + (i - (len(flights) - 1) / 2) * height for scene in gains]
-                label = "one ray at a time" if flight == 1 else f"in flight: {flight}"
-                bars = panel.barh(places, list(gains.values()), height * 0.9, label=label, color=f"C{i}")
-                panel.bar_label(bars, fmt="%.0f", fontsize=7, padding=2)
-            panel.axvline(0, color="0.4", linewidth=1)
-            panel.set_title(f"{kernel}, {accuracy}", fontsize=9)
-            panel.set_yticks(range(len(scenes)), scenes, fontsize=8)
-            panel.set_ylim(len(scenes) - 0.5, -0.5)
-            panel.margins(x=0.15)
-            panel.tick_params(length=0, labelsize=8)
-            panel.spines[["top", "right", "left"]].set_visible(False)
-    for panel in panels[-1]:
-        panel.set_xlabel("gain over Embree in percent", fontsize=9)
-    handles, labels = panels[0][0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=len(labels), frameon=False, fontsize=9)
-    return figure
 
 
 def parse_options(options: Sequence[str]) -> argparse.Namespace:

@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 
 from bench.contenders.pareto_contenders import CONTENDERS, Array, Contender, contenders, exact_prims
 from bench.contenders.speeds import speeds
-from bench.figures.pareto_figure import draw
 from bench.support import report
 from bench.support.options import scene_parser
 from bench.support.pareto_scenes import COLUMNS as SCENE_COLUMNS
@@ -96,7 +95,7 @@ def main(options: Sequence[str]) -> None:
         "scene_means": scene_means,
     }
     whole = scenes.whole and not chosen.quick and not missing
-    report.save("pareto", content, draw(means, rows), chosen.out, whole=whole)
+    report.save("pareto", content, chosen.out, whole=whole)
 
 
 def case(scale: float, place: float, quick: bool) -> Case:

@@ -11,7 +11,6 @@ finds one twice. The last table has microseconds of a whole call for a single ra
 import argparse
 from collections.abc import Iterator, Sequence
 
-import matplotlib
 import numpy as np
 
 from bench.contenders.python_callers import ALL, QUERIES, SCENE, Caller, Ours, absent, others
@@ -30,10 +29,6 @@ from bench.support.timing import (
     timed,
     wall_timed,
 )
-
-matplotlib.use("Agg")
-from matplotlib import pyplot
-from matplotlib.figure import Figure
 
 SCENES = ("living_room", "bmw_m6", "bathroom_salledebain", "furball_embree_tubes")
 OPTIONAL = {"open3d"}  # a run without it is whole
@@ -78,7 +73,7 @@ def main(options: Sequence[str]) -> None:
     print("".join(f"\n{line}" for line in missing))
     content = {"missing": missing, "rows": rows, "means": means, "single": single}
     whole = scenes.whole and not chosen.quick and chosen.rays == RAY_KINDS and set(absent()) <= OPTIONAL
-    report.save("python", content, draw(means), chosen.out, whole=whole)
+    report.save("python", content, chosen.out, whole=whole)
 
 
 def speed_rows(
@@ -166,31 +161,6 @@ def mean_rows(rows: Sequence[report.Row]) -> list[report.Row]:
             }
         )
     return means
-
-
-def draw(means: Sequence[report.Row]) -> Figure:
-    """Bars of the mean ratio per rival, a colour per number of threads."""
-    rivals = list(dict.fromkeys(_label(row) for row in means))
-    threads = list(dict.fromkeys(row["threads"] for row in means))
-    figure, panel = pyplot.subplots(figsize=(9, 1.2 + 0.55 * len(rivals)), layout="constrained")
-    height = 0.8 / len(threads)
-    for i, number in enumerate(threads):
-        ratios = {_label(row): row["mean"] for row in means if row["threads"] == number}
-        places = [rivals.index(name) + (i - (len(threads) - 1) / 2) * height for name in ratios]
-        label = f"wive on {number} thread{'s' * (number > 1)}"
-        bars = panel.barh(places, list(ratios.values()), height * 0.9, label=label, color=f"C{i}")
-        panel.bar_label(bars, fmt="%.1f", fontsize=8, padding=2)
-    panel.axvline(1.0, color="0.4", linewidth=1)
-    panel.set_xscale("log")
-    panel.xaxis.set_major_formatter("{x:g}")
-    panel.xaxis.set_minor_formatter("")
-    panel.set_xlabel("the other's seconds over wive's, geometric mean over scenes and rays", fontsize=9)
-    panel.set_yticks(range(len(rivals)), rivals, fontsize=8)
-    panel.set_ylim(len(rivals) - 0.5, -0.5)
-    panel.margins(x=0.1)
-    panel.spines[["top", "right", "left"]].set_visible(False)
-    panel.legend(frameon=False, fontsize=8)
-    return figure
 
 
 def _label(row: report.Row) -> str:

@@ -40,7 +40,7 @@ def main(options: Sequence[str]) -> None:
     report.print_table(rows, COLUMNS, "quality='high' over quality='medium'")
     report.print_table([means], list(means), "Geometric means")
     whole = scenes.whole and not chosen.quick
-    report.save("quality", {"rows": rows, "means": means}, None, chosen.out, whole=whole)
+    report.save("quality", {"rows": rows, "means": means}, chosen.out, whole=whole)
 
 
 def scene_row(mesh: Mesh, sets: Sequence[Rays], effort: Effort) -> report.Row:

@@ -12,7 +12,6 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Literal
 
-import matplotlib
 import numpy as np
 
 import wive
@@ -21,10 +20,6 @@ from bench.support.options import scene_parser
 from bench.support.rays import random_rays
 from bench.support.scenes import SceneFolder
 from bench.support.timing import QUICK, Effort, compare, wall_timed
-
-matplotlib.use("Agg")
-from matplotlib import pyplot
-from matplotlib.figure import Figure
 
 USUAL = ("terrain_jacksboro", "city_san_francisco")
 QUICK_SCENES = ("terrain_2k",)
@@ -59,7 +54,7 @@ def main(options: Sequence[str]) -> None:
                 report.print_progress(rows[-1], COLUMNS)
     report.print_table(rows, COLUMNS, "Streams, all cores: seconds of one batch in memory over the stream's")
     whole = scenes.whole and not chosen.quick
-    report.save("stream", {"rays": count, "rows": rows}, draw(rows), chosen.out, whole=whole)
+    report.save("stream", {"rays": count, "rows": rows}, chosen.out, whole=whole)
 
 
 def row_of(
@@ -97,18 +92,6 @@ def row_of(
         "low": found.low,
         "high": found.high,
     }
-
-
-def draw(rows: Sequence[report.Row]) -> Figure:
-    """Ratios by scene and form."""
-    figure, axes = pyplot.subplots(figsize=(8, 4), layout="constrained")
-    places = range(len(rows))
-    axes.bar(places, [row["ratio"] for row in rows], width=0.6)
-    axes.axhline(0.9, color="0.4", linewidth=1)
-    axes.set_xticks(places, [f"{row['scene']}\n{row['form']}" for row in rows], fontsize=6)
-    axes.set_ylabel("speed over that of one batch in memory")
-    axes.spines[["top", "right"]].set_visible(False)
-    return figure
 
 
 def parse_options(options: Sequence[str]) -> argparse.Namespace:

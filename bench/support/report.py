@@ -1,4 +1,4 @@
-"""The output of every bench: a printed table, a JSON file with the machine it ran on, a PNG figure."""
+"""The output of every bench: a printed table, a JSON file with the machine it ran on, a figure of it."""
 
 import datetime
 import importlib.metadata
@@ -8,16 +8,14 @@ import subprocess
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from bench.contenders.compiled_shim import BenchError, cache_folder, compiler_version, embreex_version
 from wive._internal.files import atomic_write
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
 REPOSITORY = Path(__file__).resolve().parents[2]
 RESULTS = REPOSITORY / "bench" / "results"
+DOTS_PER_INCH = 160  # of figures
 LONGEST_LINE = 110  # characters of a dict outside tables; in a longer one each key has a line of its own
 Row = dict[str, Any]
 
@@ -69,8 +67,8 @@ def print_progress(row: Row, columns: Sequence[str]) -> None:
     print("  ".join(_text(row[column]) for column in columns), file=sys.stderr, flush=True)
 
 
-def save(name: str, content: Row, figure: "Figure | None", folder: Path | None, *, whole: bool) -> Path:
-    """Writes NAME.json and NAME.png; returns the JSON file's path.
+def save(name: str, content: Row, folder: Path | None, *, whole: bool) -> Path:
+    """Writes NAME.json and its figure, NAME.png; returns the JSON file's path.
 
     They go into the folder given, or else into bench/results after a whole run and into the cache after a
     partial one, which must not replace results that the docs quote.
@@ -79,11 +77,22 @@ def save(name: str, content: Row, figure: "Figure | None", folder: Path | None, 
     path = folder / f"{name}.json"
     write(path, {"bench": name, "environment": environment(), **content})
     print(f"\nwrote {path}")
-    if figure is not None:
-        with atomic_write(path.with_suffix(".png")) as file:
-            figure.savefig(file, format="png", dpi=130)
-        print(f"wrote {path.with_suffix('.png')}")
+    save_figure(name, content, folder)
     return path
+
+
+def save_figure(name: str, content: Row, folder: Path) -> None:
+    """Writes NAME.png, if the bench has a figure."""
+    from bench import figures
+
+    figure = figures.draw(name, content)
+    if figure is None:
+        return
+    path = folder / f"{name}.png"
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with atomic_write(path) as file:
+        figure.savefig(file, format="png", dpi=DOTS_PER_INCH, metadata={"Title": figure.get_suptitle()})
+    print(f"wrote {path}")
 
 
 def partial_folder() -> Path:
