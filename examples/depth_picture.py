@@ -2,15 +2,17 @@
 
     python examples/depth_picture.py
 
-Prints the depth picture, the nearer the darker, and shading by a lamp at the camera.
+Prints what is seen and draws depth_picture.png.
 """
 
 import numpy as np
+from matplotlib.figure import Figure
+from pictures import bare, page, save
 
 import wive
 
-SHADES = "@%#*+=-:. "
-WIDTH, HEIGHT = 72, 30
+WIDTH, HEIGHT = 640, 480
+POSE = np.array([[1, 0, 0, 0], [0, -0.6, 0.8, -3.2], [0, -0.8, -0.6, 2.4], [0, 0, 0, 1]])
 
 
 def torus(steps: int = 48) -> tuple[np.ndarray, np.ndarray]:
@@ -24,22 +26,32 @@ def torus(steps: int = 48) -> tuple[np.ndarray, np.ndarray]:
     return vertices.astype(np.float32), faces
 
 
-def main() -> None:
-    """Take the pictures from 4 units away, looking down at the torus, and print two of them."""
-    scene = wive.Scene(*torus())
-    pose = np.array([[1, 0, 0, 0], [0, -0.6, 0.8, -3.2], [0, -0.8, -0.6, 2.4], [0, 0, 0, 1]])
-    camera = wive.PinholeCamera((80, 40, (WIDTH - 1) / 2, (HEIGHT - 1) / 2), pose)  # fx, fy, cx, cy
-    hits = scene.intersect(*camera.rays(WIDTH, HEIGHT))
-    depth = hits.t  # (30,72), along the camera's axis; inf on a miss
-    normals = hits.normals()  # (30,72,3), NaN on a miss
-    in_camera = normals @ pose[:3, :3]  # the same in the camera's axes
-    triangles = hits.prim  # (30,72), -1 on a miss
-    lit = np.nan_to_num(hits.cosines())  # (30,72), 0 on a miss
+def draw(hits: wive.Hits) -> Figure:
+    """Depth, normals and triangles side by side, cut to what is seen."""
+    seen = hits.mask
+    rows, columns = (np.flatnonzero(seen.any(axis=axis)) for axis in (1, 0))
+    part = np.s_[rows[0] - 10 : rows[-1] + 10, columns[0] - 10 : columns[-1] + 10]
+    depth = np.where(seen, hits.t, np.nan)
+    normals = np.nan_to_num((hits.normals() + 1) / 2, nan=1.0)
+    triangles = np.where(seen, hits.prim % 20, np.nan)
+    figure = page((6.4, 1.7))
+    pictures = (depth, "viridis_r", "depth"), (normals, None, "normals"), (triangles, "tab20", "triangles")
+    for i, (picture, colors, title) in enumerate(pictures):
+        bare(figure, (0.01 + i * 0.333, 0.01, 0.315, 0.86), title).imshow(picture[part], cmap=colors)
+    return figure
 
-    for picture in (np.interp(depth, (2.5, 5), (0, 1)), 1 - lit):
-        print("\n".join("".join(SHADES[int(9 * value)] for value in row) for row in picture))
+
+def main() -> None:
+    """Take the pictures from 4 units away, looking down at the torus."""
+    scene = wive.Scene(*torus())
+    camera = wive.PinholeCamera((700, 700, (WIDTH - 1) / 2, (HEIGHT - 1) / 2), POSE)  # fx, fy, cx, cy
+    hits = scene.intersect(*camera.rays(WIDTH, HEIGHT))
+    depth = hits.t  # (480,640), along the camera's axis; inf on a miss
+    in_camera = hits.normals() @ POSE[:3, :3]  # (480,640,3) in the camera's axes, NaN on a miss
+    triangles = hits.prim  # (480,640), -1 on a miss
     print(f"{len(np.unique(triangles)) - 1} triangles seen, the nearest {depth.min():.2f} away;")
     print(f"normals point towards the camera by {-np.nanmean(in_camera[..., 2]):.2f} in the mean")
+    save(draw(hits), __file__)
 
 
 if __name__ == "__main__":

@@ -1,13 +1,18 @@
 """How thick is a part by the largest ball that touches a triangle from inside?
 
+    python examples/inscribed_balls.py
     python examples/inscribed_balls.py part.stl
 
-Prints the distribution of the balls' diameters. Unlike rays straight through, balls tell corners from walls.
+Prints the distribution of the balls' diameters and draws inscribed_balls.png. Unlike rays straight through,
+balls tell corners from walls. Without a file the part is a vase.
 """
 
 import argparse
+from pathlib import Path
 
 import numpy as np
+from meshes import scene_of
+from pictures import save, surface
 
 import wive
 
@@ -27,14 +32,16 @@ def diameters(scene: wive.Scene, steps: int = 30) -> np.ndarray:
 
 
 def main() -> None:
-    """Read a mesh and print its thickness."""
+    """Print and draw the thickness."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("mesh", help="a mesh file")
-    found = diameters(wive.Scene.from_file(parser.parse_args().mesh))
+    parser.add_argument("mesh", type=Path, nargs="?", help="a mesh file; default: a vase")
+    scene = scene_of(parser.parse_args().mesh)
+    found = diameters(scene)
     low, middle, high = np.nanpercentile(found, (0, 50, 100))
     print(f"diameters of inscribed balls: least {low:.4g}, median {middle:.4g}, greatest {high:.4g}")
+    save(surface(scene, found, *np.nanpercentile(found, (5, 95)), "ball", "viridis"), __file__)
 
 
 if __name__ == "__main__":

@@ -1,19 +1,21 @@
 """Ambient occlusion of what a camera sees, by your own rays.
 
+    python examples/occlusion_picture.py
     python examples/occlusion_picture.py mesh.ply
 
-Writes mesh.occlusion.npy, a picture (270,480), and prints it. `wive.render(scene, shading="ao")` does the
-same with colours, smooth edges and a reach that suits rooms.
+Draws occlusion_picture.png and writes the numbers (270,480) as occlusion_picture.npy. Without a file the mesh
+is a street. `wive.render(scene, shading="ao")` does the same with colours, smooth edges and a reach for
+rooms.
 """
 
-import sys
+import argparse
 from pathlib import Path
 
 import numpy as np
+from meshes import street
+from pictures import bare, page, save
 
 import wive
-
-SHADES = "@%#*+=-:. "
 
 
 def occlusion(scene: wive.Scene, camera: wive.Camera, width: int = 480, height: int = 270, rays: int = 32):
@@ -31,12 +33,19 @@ def occlusion(scene: wive.Scene, camera: wive.Camera, width: int = 480, height: 
 
 def main() -> None:
     """Take the picture from where most of the mesh is seen."""
-    path = Path(sys.argv[1])
-    scene = wive.Scene.from_file(path)
-    picture = occlusion(scene, wive.Camera.showing(scene))
-    np.save(path.with_suffix(".occlusion.npy"), picture.astype(np.float32))
-    for row in picture[::9, ::5]:
-        print("".join(SHADES[int(9 * value)] for value in row))
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("mesh", type=Path, nargs="?", help="a mesh file; default: a street")
+    path = parser.parse_args().mesh
+    scene = wive.Scene(*street()) if path is None else wive.Scene.from_file(path)
+    above = wive.Camera(eye=(-48, -22, 30), target=(2, 0, 0), up=(0, 0, 1), fov=32)
+    found = occlusion(scene, wive.Camera.showing(scene) if path else above)
+    np.save("occlusion_picture.npy", found.astype(np.float32))
+    print(f"{found.mean():.0%} of the rays leave the scene")
+    figure = page((6.4, 3.6))
+    bare(figure).imshow(found, cmap="gray", vmin=0, vmax=1)
+    save(figure, __file__)
 
 
 if __name__ == "__main__":

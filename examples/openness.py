@@ -1,14 +1,18 @@
 """Ambient occlusion: how much of the sky does each triangle see?
 
-    python examples/openness.py room.glb --rays 64
+    python examples/openness.py
+    python examples/openness.py part.stl --rays 64
 
-Writes the openness of the triangles, (f,) from 0 to 1, beside the mesh, as room.openness.npy.
+Draws openness.png and writes the openness of the triangles, (f,) from 0 to 1, as openness.npy. Without a file
+the part is a vase.
 """
 
 import argparse
 from pathlib import Path
 
 import numpy as np
+from meshes import scene_of
+from pictures import save, surface
 
 import wive
 
@@ -29,17 +33,19 @@ def openness(scene: wive.Scene, rays: int = 64, reach: float = np.inf) -> np.nda
 
 
 def main() -> None:
-    """Read a mesh and write the openness of its triangles."""
+    """Write and draw the openness."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("mesh", type=Path, help="a mesh file")
+    parser.add_argument("mesh", type=Path, nargs="?", help="a mesh file; default: a vase")
     parser.add_argument("--rays", type=int, default=64, help="rays per triangle")
     parser.add_argument("--reach", type=float, default=np.inf, help="what is farther away does not count")
     arguments = parser.parse_args()
-    found = openness(wive.Scene.from_file(arguments.mesh), arguments.rays, arguments.reach)
-    np.save(arguments.mesh.with_suffix(".openness.npy"), found)
+    scene = scene_of(arguments.mesh)
+    found = openness(scene, arguments.rays, arguments.reach)
+    np.save("openness.npy", found)
     print(f"{len(found)} triangles, openness {found.mean():.3f} on average")
+    save(surface(scene, found, 0, 1, "open", "gray"), __file__)
 
 
 if __name__ == "__main__":

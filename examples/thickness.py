@@ -1,13 +1,18 @@
 """How thick is a part under each of its triangles? Where is it too thin?
 
+    python examples/thickness.py
     python examples/thickness.py part.stl --thinnest 0.8
 
-Prints the distribution of the thickness, and how much of the surface lies above less than `--thinnest`.
+Prints the distribution of the thickness and how much of the surface lies above less than `--thinnest`, and
+draws thickness.png. Without a file the part is a vase.
 """
 
 import argparse
+from pathlib import Path
 
 import numpy as np
+from meshes import scene_of
+from pictures import save, surface
 
 import wive
 
@@ -27,14 +32,14 @@ def thickness(scene: wive.Scene) -> tuple[np.ndarray, np.ndarray]:
 
 
 def main() -> None:
-    """Read a mesh and print its thickness."""
+    """Print and draw the thickness."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("mesh", help="a mesh file")
-    parser.add_argument("--thinnest", type=float, default=1.0, help="what is allowed, in the file's unit")
+    parser.add_argument("mesh", type=Path, nargs="?", help="a mesh file; default: a vase")
+    parser.add_argument("--thinnest", type=float, default=0.1, help="what is allowed, in the file's unit")
     arguments = parser.parse_args()
-    found, areas = thickness(wive.Scene.from_file(arguments.mesh))
+    found, areas = thickness(scene := scene_of(arguments.mesh))
     known = np.isfinite(found)
     if not known.any():
         parser.exit(1, "no triangle has another side: is the mesh closed, with normals outwards?\n")
@@ -42,6 +47,7 @@ def main() -> None:
     print(f"thickness: least {low:.4g}, median {middle:.4g}, greatest {high:.4g}")
     thin = areas[known & (found < arguments.thinnest)].sum() / areas.sum()
     print(f"thinner than {arguments.thinnest:g}: {thin:.1%} of the surface")
+    save(surface(scene, found, *np.percentile(found[known], (5, 95)), "wall", "viridis"), __file__)
 
 
 if __name__ == "__main__":

@@ -2,14 +2,16 @@
 
     python examples/viewshed.py
 
-Prints a map: the land that is seen from the highest place is dark. Needs matplotlib, which brings elevations.
+Prints shares and heights and draws viewshed.png: the land that is seen from the highest place. Matplotlib
+brings the elevations.
 """
 
 import numpy as np
+from matplotlib.figure import Figure
+from meshes import land
+from pictures import bare, page, relief, save
 
 import wive
-
-METRES_PER_DEGREE = 111_320.0
 
 
 def sees(scene: wive.Scene, a: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -46,28 +48,33 @@ def sky_view(horizons: np.ndarray) -> np.ndarray:
     return np.mean(np.cos(np.radians(np.clip(horizons, 0, 90))) ** 2, axis=-1)
 
 
-def main() -> None:
-    """Print the land that the highest place of the Jacksboro fault in Tennessee sees."""
-    from matplotlib import cbook
+def draw(z: np.ndarray, seen: np.ndarray) -> Figure:
+    """The relief, warm where it is seen from the highest place."""
+    light = relief(z)[..., None]
+    gray, warm = 0.35 + 0.6 * light * np.ones(3), (0.3 + 0.7 * light) * np.array([1.0, 0.62, 0.25])
+    figure = page()
+    axes = bare(figure)
+    axes.imshow(np.where(seen[..., None], warm, gray).clip(0, 1), aspect="auto")
+    row, column = np.unravel_index(np.argmax(z), z.shape)
+    style = {"size": 11, "color": "black", "weight": "bold"}
+    axes.plot(column, row, "^", color="black", markersize=9)
+    axes.annotate("lookout", (column, row), (6, -14), textcoords="offset points", **style)
+    axes.text(0.01, 0.02, "orange: seen from there", transform=axes.transAxes, **style)
+    return figure
 
-    with np.load(cbook.get_sample_data("jacksboro_fault_dem.npz", asfileobj=False)) as sample:
-        z = sample["elevation"].astype(np.float64)
-        x = np.arange(z.shape[1]) * float(sample["dx"]) * METRES_PER_DEGREE * np.cos(np.radians(36.6))
-        y = np.arange(z.shape[0]) * -float(sample["dy"]) * METRES_PER_DEGREE  # from north to south
+
+def main() -> None:
+    """Print and draw the land that the highest place of the Jacksboro fault in Tennessee sees."""
+    z, x, y = land()
     scene = wive.Scene.from_heightfield(z, x, y)
-    top = np.argmax(z)
-    eye = scene.vertices[top] + [0, 0, 10]  # on a tower of 10 m
+    eye = scene.vertices[np.argmax(z)] + [0, 0, 10]  # on a tower of 10 m
     seen = viewshed(scene, eye, z.shape, above=1.8)
     valley = scene.vertices[np.argmin(z)] + [0, 0, 1.8]
     horizons = horizon(scene, valley, np.arange(0, 360, 5))
-
-    for row, column in np.ndindex(43, 80):
-        place = row * 8, column * 5
-        is_top = place == (top // z.shape[1] // 8 * 8, top % z.shape[1] // 5 * 5)
-        print("^" if is_top else "#" if seen[place] else ".", end="\n" if column == 79 else "")
-    print(f"{100 * seen.mean():.1f} % of the land is seen from the highest place. At the lowest place the")
     height, sky = horizons.max(), sky_view(horizons)
+    print(f"{100 * seen.mean():.1f} % of the land is seen from the highest place. At the lowest place the")
     print(f"horizon is up to {height:.1f} degrees high, and the sky view factor is {sky:.3f}.")
+    save(draw(z, seen), __file__)
 
 
 if __name__ == "__main__":

@@ -2,11 +2,14 @@
 
     python examples/wall_thickness.py
 
-Prints the thinnest wall, the share of the surface behind which the wall is thinner than 3, and the volume.
+Prints the thinnest wall, the share of the surface behind which the wall is thinner than 3, and the volume,
+and draws wall_thickness.png, the samples of the surface.
 """
 
 import numpy as np
 import trimesh
+from matplotlib.figure import Figure
+from pictures import bar, page, save
 
 import wive
 
@@ -19,6 +22,20 @@ def casing() -> trimesh.Trimesh:
     return box + cavity
 
 
+def draw(points: np.ndarray, thickness: np.ndarray) -> Figure:
+    """The samples, opened along y: what lies behind the middle, coloured by the wall there."""
+    back = points[:, 1] > 0
+    figure = page()
+    axes = figure.add_axes((-0.08, -0.12, 1.02, 1.24), projection="3d")
+    axes.set_axis_off()
+    axes.set_box_aspect((40, 30, 20))
+    axes.view_init(elev=18, azim=-68)
+    shown = points[back]
+    axes.scatter(*shown.T, c=thickness[back], s=2.5, linewidths=0, cmap="viridis", vmin=2, vmax=6)
+    bar(figure, "wall", 2, 6, "viridis")
+    return figure
+
+
 def main() -> None:
     """Sample the surface and the space around it."""
     wive.trimesh.install()
@@ -29,6 +46,7 @@ def main() -> None:
     volume = mesh.contains(places).mean() * np.prod(mesh.extents)
     print(f"thinnest wall {thickness.min():.3f}, thinner than 3: {(thickness < 3).mean():.1%} of the surface")
     print(f"volume {volume:.0f} by points inside, {mesh.volume:.0f} by the divergence theorem")
+    save(draw(points, thickness), __file__)
 
 
 if __name__ == "__main__":

@@ -20,7 +20,8 @@ def draw(content: Row) -> Figure:
     gain = max(row["build_ms"] / row["geom_ms"] for row in rows)
     figure, (axes,) = style.page(
         1.6 + 0.36 * len(rows),
-        f"One mesh moves in {min(ours):.1f} to {max(ours):.0f} ms:\nup to {gain:,.0f} times faster than a new scene",
+        f"One mesh moves in {min(ours):.1f} to {max(ours):.0f} ms,\n"
+        f"a new scene takes up to {gain:,.0f} times as long",
         "Medians on all cores",
     )
     style.rows(

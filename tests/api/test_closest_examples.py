@@ -35,17 +35,26 @@ def test_balls_in_a_shell_are_as_thick_as_its_wall_and_in_a_ball_as_the_ball(
     assert (abs(solid - 2) < 0.3).all()  # the flat triangles nearby are in the way
 
 
-def test_the_programs_run(
+def test_programs_take_files(
     shell: tuple[np.ndarray, np.ndarray],
     tmp_path: Path,
     capsys: pytest.CaptureFixture,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    path = tmp_path / "shell.npz"
-    np.savez(path, vertices=shell[0], faces=shell[1])
-    monkeypatch.setattr(sys, "argv", ["inscribed_balls", str(path)])
-    example("inscribed_balls").main()
-    monkeypatch.setattr(sys, "argv", ["contains", str(path), str(path)])
-    example("contains").main()
+    pytest.importorskip("matplotlib")
+    monkeypatch.chdir(tmp_path)
+    np.savez("shell.npz", vertices=shell[0], faces=shell[1])
+    for name, files in (("inscribed_balls", 1), ("contains", 2)):
+        monkeypatch.setattr(sys, "argv", [name, *["shell.npz"] * files])
+        example(name).main()
+        assert (tmp_path / f"{name}.png").exists()
     text = capsys.readouterr().out
     assert "balls: least 0.09" in text and "100.0% inside the other part" in text
+
+
+def test_one_file_alone_is_refused(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture) -> None:
+    pytest.importorskip("matplotlib")
+    monkeypatch.setattr(sys, "argv", ["contains", "shell.npz"])
+    with pytest.raises(SystemExit):
+        example("contains").main()
+    assert "expected two mesh files or none" in capsys.readouterr().err

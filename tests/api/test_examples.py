@@ -1,68 +1,21 @@
-"""The programs in examples/ run, and their functions agree with what they compute, by brute force."""
+"""Functions of the programs in examples/ about terrain agree with what they compute, by brute force."""
 
-import re
-import runpy
-import subprocess
-import sys
-from pathlib import Path
-from types import SimpleNamespace
+from types import ModuleType
 
 import numpy as np
 import pytest
+from support.programs import example
 
 import wive
 
-EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
+pytest.importorskip("matplotlib")
+
 ROWS, COLUMNS = 9, 8
 
 
-def printed_by(name: str, folder: Path) -> str:
-    """What an example prints; it must not warn."""
-    command = [sys.executable, "-W", "error", str(EXAMPLES / f"{name}.py")]
-    run = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=100, check=False)
-    assert run.returncode == 0, run.stderr
-    return run.stdout
-
-
-def test_walls_of_a_casing_are_as_thick_as_it_was_made(tmp_path: Path) -> None:
-    pytest.importorskip("trimesh")
-    numbers = map(float, re.findall(r"\d+\.?\d*", printed_by("wall_thickness", tmp_path)))
-    thinnest, _, share, by_points, by_theorem = numbers
-    outer, cavity = 2 * (40 * 30 + 30 * 20 + 20 * 40), 2 * (32 * 22 + 22 * 12 + 12 * 32)
-    thin = 2 * (32 * 22 + 22 * 12)  # two walls of 2, seen from either side
-    assert thinnest == 2
-    assert share == pytest.approx(100 * thin / (outer + cavity), rel=0.02)
-    assert by_theorem == 40 * 30 * 20 - 32 * 22 * 12
-    assert by_points == pytest.approx(by_theorem, rel=0.005)
-
-
-def test_a_lidar_sees_houses_on_both_sides_and_the_road(tmp_path):
-    lines = printed_by("lidar", tmp_path).splitlines()
-    assert set(lines[15]) == {"@"}, "the lowest beam meets the road nearby in all directions"
-    assert set(lines[0]) >= {" ", "#"}, "the highest one meets houses, and the sky between them"
-    assert "of 1536 rays returned" in lines[16]
-
-
-def test_a_torus_is_seen_with_its_hole(tmp_path):
-    lines = printed_by("depth_picture", tmp_path).splitlines()
-    depth = lines[:30]
-    middle = [row for row in depth if row.strip() and "  " in row.strip()]
-    assert middle, "background within the torus"
-    assert depth[0].strip() == depth[-1].strip() == "", "background above and below"
-    assert "triangles seen" in lines[60]
-
-
-def test_a_lookout_sees_some_land_and_a_valley_has_a_horizon(tmp_path):
-    pytest.importorskip("matplotlib")
-    text = printed_by("viewshed", tmp_path)
-    assert text.count("^") == 1
-    assert text.count("#") > 400
-    assert text.count(".\n") > 10
-
-
 @pytest.fixture(scope="module")
-def recipes() -> SimpleNamespace:
-    return SimpleNamespace(**runpy.run_path(str(EXAMPLES / "viewshed.py")))
+def recipes() -> ModuleType:
+    return example("viewshed")
 
 
 class Terrain:
@@ -159,3 +112,41 @@ def test_the_sky_view_factor_is_that_of_a_wall_and_of_a_basin(recipes):
     integrand = np.sin(elevations) * np.cos(elevations)
     integral = 2 * np.mean((integrand[1:] + integrand[:-1]) / 2) * np.radians(60)
     assert recipes.sky_view(np.full(36, 30.0)) == pytest.approx(integral, rel=1e-6)
+
+
+def test_the_sun_is_overhead_at_noon_on_the_equator_and_a_flat_land_has_twelve_hours_of_it(recipes):
+    module = example("sun_hours")
+    np.testing.assert_allclose(module.sun(12, 0, 0), (0, 0, 1), atol=1e-15)
+    np.testing.assert_allclose(module.sun(6, 0.5, 0), (1, 0, 0), atol=1e-15)  # rises in the east
+    assert module.sun(12, np.radians(50), 0)[1] < 0, "in the south at noon"
+    flat = wive.Scene.from_heightfield(np.zeros((3, 3)), np.arange(3.0), np.arange(3.0))
+    hours = module.sun_hours(flat, np.array([[1.0, 1, 0.5]]), np.radians(50), np.radians(1e-6))
+    assert hours == pytest.approx(12, abs=module.STEP)
+    walled = wive.Scene.from_heightfield(
+        np.array([[0, 0, 0], [0, 0, 0], [99.0, 99, 99]]), np.linspace(-1e4, 1e4, 3), -np.arange(3.0)
+    )
+    assert module.sun_hours(walled, np.array([[1.0, 0, 0.5]]), np.radians(50), 0.0) < 1, "a wall in the south"
+
+
+def test_a_plain_sees_all_of_the_sky_and_a_place_at_a_wall_half(recipes):
+    module = example("sky_view")
+    x = np.linspace(-50, 50, 101)
+    z = np.where(x[:, None] < 0, 1e4, 0.0) * np.ones(101)
+    scene = wive.Scene.from_heightfield(z, x, x)
+    assert module.sky_view(scene, np.array([[0.0, 0.05, 0.01]])) == pytest.approx(0.5, abs=0.08)
+    assert module.sky_view(wive.Scene.from_heightfield(0 * z, x, x), np.array([[0.0, 0, 1]])) == 1
+
+
+def test_masts_see_each_other_unless_a_hill_is_between(recipes):
+    module = example("line_of_sight")
+    terrain = Terrain(7)
+    tops = terrain.points[[1, 4, 7], [1, 3, 6]] + np.array([0, 0, 0.8])
+    found = module.network(terrain.scene, tops)
+    for i, j in ((0, 1), (1, 2), (0, 2)):
+        expected, clearance = terrain.sees(tops[i], tops[j])
+        assert clearance > 1e-6
+        assert found[i, j] == found[j, i] == expected
+    z = np.random.default_rng(1).random((40, 50))
+    places = module.high_places(z)
+    assert len(np.unique(places, axis=0)) == module.BLOCKS**2
+    assert tuple(np.unravel_index(z.argmax(), z.shape)) in set(map(tuple, places.tolist()))

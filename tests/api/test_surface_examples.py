@@ -46,15 +46,44 @@ def test_an_occlusion_picture_is_that_of_the_renderer(tmp_path: Path) -> None:
     assert found[:4].mean() == pytest.approx(expected[:4].mean(), abs=0.02)
 
 
-def test_the_programs_run(
+def test_programs_take_files(
     shell: tuple[np.ndarray, np.ndarray],
     tmp_path: Path,
     capsys: pytest.CaptureFixture,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    np.savez(tmp_path / "shell.npz", vertices=shell[0], faces=shell[1])
-    for name in ("thickness", "openness", "occlusion_picture"):
-        monkeypatch.setattr(sys, "argv", [name, str(tmp_path / "shell.npz")])
+    pytest.importorskip("matplotlib")
+    monkeypatch.chdir(tmp_path)
+    np.savez("shell.npz", vertices=shell[0], faces=shell[1])
+    for name in ("thickness", "openness", "undercut", "xray", "signed_distance", "occlusion_picture"):
+        monkeypatch.setattr(sys, "argv", [name, "shell.npz"])
         example(name).main()
-    assert "least 0.099" in (text := capsys.readouterr().out) and "100.0% of the surface" in text
-    assert np.load(tmp_path / "shell.openness.npy").shape == (len(shell[1]),)
+        assert (tmp_path / f"{name}.png").exists()
+    assert "least 0.099" in (text := capsys.readouterr().out) and "100.0% of the surface" not in text
+    assert np.load("openness.npy").shape == (len(shell[1]),)
+    assert np.load("occlusion_picture.npy").shape == (270, 480)
+
+
+def test_the_outside_of_a_shell_is_no_undercut_and_all_of_its_inside_is(
+    shell: tuple[np.ndarray, np.ndarray],
+) -> None:
+    found, areas = example("undercut").undercut(wive.Scene(*shell), np.array([0.2, 0.3, 0.9]))
+    half = len(found) // 2
+    assert not found[:half].any() and found[half:].all()
+    assert areas[:half].sum() == pytest.approx(4 * np.pi, rel=0.01)
+
+
+def test_an_x_ray_of_a_shell_passes_its_wall_twice(shell: tuple[np.ndarray, np.ndarray]) -> None:
+    module = example("xray")
+    camera = wive.OrthographicCamera((0, -3, 0), (0, 0, 0), up=(0, 0, 1), view_height=2.4)
+    found = module.through(wive.Scene(*shell), camera)
+    middle = found[module.HEIGHT // 2, module.WIDTH // 2]
+    assert middle == pytest.approx(0.2, abs=2e-3) and found[0, 0] == 0
+    volume = found.sum() * (2.4 / module.HEIGHT) ** 2
+    assert volume == pytest.approx(4 / 3 * np.pi * (1 - 0.9**3), rel=0.01)
+
+
+def test_a_slice_of_a_ball_has_the_distances_to_it() -> None:
+    places, found = example("signed_distance").slice_of(wive.Scene(*sphere(4)))
+    np.testing.assert_allclose(found, np.linalg.norm(places, axis=-1) - 1, atol=2e-3)
+    assert (found < 0).any() and (found > 0).any()
