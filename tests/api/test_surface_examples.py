@@ -59,7 +59,7 @@ def test_programs_take_files(
         monkeypatch.setattr(sys, "argv", [name, "shell.npz"])
         example(name).main()
         assert (tmp_path / f"{name}.png").exists()
-    assert "least 0.099" in (text := capsys.readouterr().out) and "100.0% of the surface" not in text
+    assert "least 0.099" in (text := capsys.readouterr().out) and "100.0% of the surface" in text
     assert np.load("openness.npy").shape == (len(shell[1]),)
     assert np.load("occlusion_picture.npy").shape == (270, 480)
 

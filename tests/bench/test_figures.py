@@ -82,6 +82,28 @@ def test_the_committed_figure_says_what_the_stored_results_say(name: str) -> Non
         assert picture.text["Title"] == drawn(name).get_suptitle(), f"run `python -m bench draw {name}`"
 
 
+# The columns that a run with fewer scenes or options has fewer values of.
+CHOICES = ("scene", "accuracy", "kernel", "threads", "quality", "rays", "width", "distance", "moving")
+
+
+@pytest.mark.parametrize("name", figures.DRAWN)
+def test_results_of_one_scene_and_of_fewest_options_are_drawn(name: str) -> None:
+    content = stored(name)
+    for key, table in content.items():
+        if isinstance(table, list) and table and isinstance(table[0], dict):
+            first = {column: table[0][column] for column in CHOICES if column in table[0]}
+            content[key] = [row for row in table if all(row[column] == first[column] for column in first)]
+    figure = figures.draw(name, content)
+    assert figure is not None
+    figure.draw_without_rendering()
+
+
+@pytest.mark.parametrize(("name", "table"), [("embree", "speed"), ("latency", "curve")])
+def test_nothing_is_drawn_of_a_run_without_that_part(name: str, table: str) -> None:
+    assert figures.draw(name, {**stored(name), table: []}) is None
+    assert figures.draw("quality", {}) is None
+
+
 def test_contenders_without_leaks_have_a_band_of_their_own() -> None:
     means = stored("pareto")["means"]
     leaking, tight = drawn("pareto").axes
