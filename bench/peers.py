@@ -72,7 +72,7 @@ def main(options: Sequence[str]) -> None:
     report.print_table(builds, list(builds[0]), "Building on all cores: the peer's seconds over wive's")
     content = {"rows": rows, "means": means, "builds": builds}
     whole = scenes.whole and not chosen.quick and set(shims) == set(LIBRARIES) and chosen.rays == KINDS
-    report.save("peers", content, None, chosen.out, whole=whole)
+    report.save("peers", content, chosen.out, whole=whole)
 
 
 def speed_rows(

@@ -10,7 +10,7 @@ if TYPE_CHECKING:
 
 DRAWN = (
     "build", "cliffs", "closest", "dask", "embree", "inflight", "latency", "moving", "order", "packets",
-    "paper", "pareto", "python", "stream",
+    "paper", "pareto", "peers", "python", "stream",
 )  # fmt: skip
 
 

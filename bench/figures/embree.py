@@ -44,7 +44,7 @@ def draw(content: Row) -> Figure | None:
             ratios = [row["ratio"] for row in speed if (row["rays"], row["in_flight"]) == (kind, way)]
             style.spread(axes, y, ratios, geometric_mean(ratios))
         axes.axvline(1, color=style.THEIRS, linewidth=2, zorder=1)
-        axes.set_xlim(left=0)
         style.subject(axes, WAYS.get(way, f"{way} rays in flight"))
+    panels[-1].set_xlim(left=0)  # of all panels, when each has its dots
     style.scale(panels[-1], f"speed, 1 = {theirs}")
     return figure
