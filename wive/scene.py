@@ -22,6 +22,7 @@ from wive._internal.mesh_objects import MeshObject, PlacedMeshes, mesh_arrays
 from wive._internal.moving_part import move_in_place
 from wive._internal.point_queries import PointQueries
 from wive._internal.precision import Floats, Precision, real_of
+from wive._internal.process_lock import PROCESS_LOCK
 from wive._internal.progress import ProgressOption, checked_progress, reported
 from wive._internal.queries import Queries
 from wive._internal.several_meshes import Joined, Pair, join, moved_rows, name_the_mesh, refitted_mesh
@@ -118,13 +119,16 @@ class Scene(Queries, PointQueries):
         )
         self._take(tracer_of(bvh, faces, found, place, geoms), faces)
 
-    def _take(self, tracer: Tracer, faces: NDArray[np.int32]) -> None:
-        """Trace with this tracer from now on."""
+    def _take(self, tracer: Tracer, faces: NDArray[np.int32], instead_of: Tracer | None = None) -> None:
+        """Trace with this tracer from now on; if one is given, only if it has not been replaced meanwhile."""
         vertices = tracer.bvh.vertices
         source = tracer.bvh.source
         make_known(vertices, faces, None if source is None else source.place)
-        self._real = real_of(vertices.dtype, tracer.bvh.accuracy)
-        self._tracer, self._faces = tracer, faces
+        with PROCESS_LOCK:
+            if instead_of is not None and self._tracer is not instead_of:
+                return
+            self._real = real_of(vertices.dtype, tracer.bvh.accuracy)
+            self._tracer, self._faces = tracer, faces
 
     @classmethod
     def from_file(
@@ -282,11 +286,11 @@ class Scene(Queries, PointQueries):
         >>> with ProcessPoolExecutor() as pool:
         ...     hits = list(pool.map(scene.intersect, origins, directions))  # one tree
         """
-        tracer = self._tracer
-        if tracer.bvh.source is None:
+        while (tracer := self._tracer).bvh.source is None:
             bvh = share(tracer.bvh, self._faces, tracer.geoms, self._options)
             faces = source_of(bvh).faces
-            self._take(tracer_of(bvh, faces, tracer.backend, tracer.device, tracer.geoms), faces)
+            shared = tracer_of(bvh, faces, tracer.backend, tracer.device, tracer.geoms)
+            self._take(shared, faces, instead_of=tracer)
 
     @property
     def vertices(self) -> Floats:

@@ -197,10 +197,11 @@ class RayMeshIntersector:
 
     def _place(self) -> PlacedMesh:
         mesh_hash = hash(self.mesh)
-        if self._placed is None or self._placed[0] != mesh_hash:
-            placed = PlacedMesh(self.mesh, self._scale_to_box, self._real, self._options)
-            self._placed = mesh_hash, placed
-        return self._placed[1]
+        kept = self._placed
+        if kept is None or kept[0] != mesh_hash:
+            kept = mesh_hash, PlacedMesh(self.mesh, self._scale_to_box, self._real, self._options)
+            self._placed = kept
+        return kept[1]
 
     def __getstate__(self) -> dict[str, Any]:
         """Everything but the tree, which is built again."""

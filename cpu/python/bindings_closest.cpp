@@ -49,6 +49,7 @@ Array<double> winding(const PyBvh& self, const Array<Real>& points, unsigned thr
     auto answer = new_array<double>({points.shape(0)});
     const Real* from = points.data();
     double* out = answer.mutable_data();
+    self.bvh();  // verifies a stored tree, which needs the interpreter lock
     {
         const Released released;
         self.winding<Real>().find(from, size, out, threads);

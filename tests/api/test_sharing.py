@@ -29,8 +29,9 @@ def scene_of(count=2000, **options) -> wive.Scene:
 
 
 def shared_names() -> set[str]:
+    """Of the memory that Python's processes share; other names are semaphores."""
     gc.collect()
-    return set(os.listdir(SHARED))
+    return {name for name in os.listdir(SHARED) if name.startswith("psm_")}
 
 
 def holds_shared_tree(scene) -> bool:
@@ -332,3 +333,25 @@ def test_four_processes_on_one_file_take_the_memory_of_one(tmp_path):
         return sum(sizes)
 
     assert memory_of(4) < 1.1 * memory_of(1)
+
+
+def test_a_copy_that_went_gives_its_name_to_no_other_mesh():
+    """Arrays that are freed leave their addresses to new ones."""
+    scene = scene_of()
+    for seed in range(10):
+        copied = pickle.loads(pickle.dumps(scene))
+        gc.collect()
+        del copied
+        other = wive.Scene(*soup(2000, seed=seed))
+        hits = other.intersect(*RAYS)
+        np.testing.assert_array_equal(pickle.loads(pickle.dumps(hits)).points(), hits.points())
+
+
+def test_hits_find_a_copy_of_the_scene_that_went():
+    scene = scene_of()
+    hits = scene.intersect(*RAYS)
+    copied, pickled, points = pickle.loads(pickle.dumps(scene)), pickle.dumps(hits), hits.points()
+    del scene, hits
+    gc.collect()
+    np.testing.assert_array_equal(pickle.loads(pickled).points(), points)
+    assert len(copied) == 2000

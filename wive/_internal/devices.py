@@ -13,6 +13,8 @@ from collections.abc import Iterator
 from types import ModuleType
 from typing import Any
 
+from wive._internal.process_lock import process_lock
+
 OLDEST_WARP = (1, 19)
 NO_WARP = 'NVIDIA Warp is not installed: pip install "wive[warp]"'
 NO_DRIVER = "no NVIDIA driver found: install one, on a machine with an NVIDIA GPU"
@@ -37,9 +39,17 @@ def warp_problem() -> str:
     return ""
 
 
-@functools.cache
+_starting = process_lock()  # one thread starts Warp, the others wait
+
+
 def warp_devices() -> dict[str, str]:
     """Each Warp device by name with the reason it can't be used, empty if it can; "cpu" comes last."""
+    with _starting:
+        return _found_devices()
+
+
+@functools.cache
+def _found_devices() -> dict[str, str]:
     wp = _start_warp()
     devices = {device.alias: _cuda_problem(wp, device) for device in wp.get_cuda_devices()}
     if not devices:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wive._internal.precision import Floats
+from wive._internal.process_lock import PROCESS_LOCK
 from wive._internal.read_only import ReadOnly
 from wive._internal.stored_scenes import Place, source_of
 
@@ -26,30 +27,35 @@ class MeshName(NamedTuple):
     dtype: str
 
 
-# By token, and by the address of the vertices, which are one object per tree. The references are weak:
-# hits keep a mesh, this doesn't.
-_meshes: dict[str, tuple[weakref.ref[Any], weakref.ref[Any]]] = {}
-_names: dict[int, MeshName] = {}
+class Known(NamedTuple):
+    """A mesh and its name. The references are weak: hits keep a mesh, this doesn't."""
+
+    name: MeshName
+    vertices: weakref.ref[Any]
+    faces: weakref.ref[Any]
+
+
+# By the address of the vertices, which are one object per tree. Several may have one token: a scene and those
+# that were unpickled from it.
+_known: dict[int, Known] = {}
 
 
 def make_known(vertices: Floats, faces: NDArray[np.int32], place: Place | None, token: str = "") -> str:
     """Give the mesh of a new scene its token, which processes forked later share; or the one it had."""
     key = id(vertices)
-    known = _names.get(key)
-    if known is not None:
-        return known.token
-    token = place.digest if place else token or os.urandom(12).hex()
 
-    def forget(_: object) -> None:
-        _names.pop(key, None)
-        if _meshes.get(token, (None,))[0] is reference:
-            del _meshes[token]
+    def forget(reference: object) -> None:
+        with PROCESS_LOCK:
+            if key in _known and _known[key].vertices is reference:
+                del _known[key]
 
-    reference = weakref.ref(vertices, forget)
-    if _meshes.get(token, (_nothing,))[0]() is None:
-        _meshes[token] = reference, weakref.ref(faces)
-    _names[key] = MeshName(token, place, len(vertices), len(faces), vertices.dtype.name)
-    return token
+    with PROCESS_LOCK:
+        name = _name_of_known(vertices)
+        if name is None:
+            token = place.digest if place else token or os.urandom(12).hex()
+            name = MeshName(token, place, len(vertices), len(faces), vertices.dtype.name)
+            _known[key] = Known(name, weakref.ref(vertices, forget), weakref.ref(faces))
+        return name.token
 
 
 def know_again(vertices: Floats, faces: NDArray[np.int32], token: str = "") -> None:
@@ -58,10 +64,9 @@ def know_again(vertices: Floats, faces: NDArray[np.int32], token: str = "") -> N
     The one that it was pickled with; or a new one if it has moved in place, so that hits pickled before don't
     find it.
     """
-    name = _names.pop(id(vertices), None)
-    if name is not None:
-        _meshes.pop(name.token, None)
-    make_known(vertices, faces, None, token)
+    with PROCESS_LOCK:
+        _known.pop(id(vertices), None)
+        make_known(vertices, faces, None, token)
 
 
 def mesh_of(name: MeshName) -> tuple[Floats, NDArray[np.int32]] | None:
@@ -69,9 +74,12 @@ def mesh_of(name: MeshName) -> tuple[Floats, NDArray[np.int32]] | None:
 
     OSError or ValueError if it is stored and no longer there.
     """
-    vertices, faces = (reference() for reference in _meshes.get(name.token, (_nothing, _nothing)))
-    if vertices is not None and faces is not None:
-        return vertices, faces
+    with PROCESS_LOCK:
+        alike = [known for known in _known.values() if known.name.token == name.token]
+    for known in alike:
+        vertices, faces = known.vertices(), known.faces()
+        if vertices is not None and faces is not None:
+            return vertices, faces
     if name.place is None:
         return None
     bvh = name.place.open()
@@ -81,8 +89,9 @@ def mesh_of(name: MeshName) -> tuple[Floats, NDArray[np.int32]] | None:
     return source.vertices, source.faces
 
 
-def _nothing() -> None:
-    return None
+def _name_of_known(vertices: Any) -> MeshName | None:
+    known = _known.get(id(vertices))
+    return None if known is None or known.vertices() is not vertices else known.name
 
 
 OfMeshT = TypeVar("OfMeshT", bound="OfMesh")
@@ -133,7 +142,7 @@ class OfMesh(ReadOnly):
         """All but the mesh, if that is a scene's."""
         state = dict(vars(self))
         if "vertices" in state:
-            name = _names.get(id(state["vertices"]))
+            name = _name_of_known(state["vertices"])
             if name is None:  # made by hand
                 return state
             state["_mesh"] = name
@@ -157,7 +166,7 @@ class OfMesh(ReadOnly):
 
         copy = object.__new__(type(self))
         memo[id(self)] = copy
-        vars(copy).update({name: deepcopy(value, memo) for name, value in vars(self).items()})
+        vars(copy).update({name: deepcopy(value, memo) for name, value in dict(vars(self)).items()})
         return copy
 
 

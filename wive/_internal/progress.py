@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import threading
 import time
-import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TypeVar
 
 from wive import _cpu
+from wive._internal.process_lock import without_warnings
 
 ProgressOption = bool | Callable[[int, int], object] | None
 # Seconds between two calls.
@@ -117,8 +117,7 @@ def _teller(
         yield option
         return
     try:
-        with warnings.catch_warnings():  # a notebook without widgets has a bar of text
-            warnings.simplefilter("ignore")
+        with without_warnings():  # a notebook without widgets has a bar of text
             from tqdm.auto import tqdm
     except ImportError:
         yield lambda done, total: None

@@ -16,6 +16,7 @@ from wive._internal import shared_memory
 from wive._internal.files import PathLike, atomic_write
 from wive._internal.lines import one_line
 from wive._internal.npzfile import check_input
+from wive._internal.process_lock import PROCESS_LOCK
 from wive._internal.progress import ProgressOption, progress_of
 from wive._internal.storage import Options
 from wive._internal.tree_file import MAGIC, Content, content_of, image_of, is_image, tree_of
@@ -124,8 +125,9 @@ def open_file(path: PathLike) -> _cpu.Bvh:
 
 def open_shared(name: str) -> _cpu.Bvh:
     """The tree in the shared memory of that name."""
-    for place, bvh in list(_held.items()):
-        if place.kind == "shared memory" and place.name == name:
+    for reference in _held.valuerefs():  # a list: other threads may open trees and let go of them meanwhile
+        bvh = reference()
+        if bvh is not None and source_of(bvh).place[:2] == ("shared memory", name):
             return bvh
     return _opened(shared_memory.attach(name), "shared memory", name, f"shared memory {name}", None)
 
@@ -146,4 +148,6 @@ def _opened(
     held = _held.get(place)
     if held is not None:
         return held
-    return _held.setdefault(place, tree_of(content, shown, Source(place, content, owner)))
+    bvh = tree_of(content, shown, Source(place, content, owner))
+    with PROCESS_LOCK:  # of threads that open the tree at once, all get the first one's
+        return _held.setdefault(place, bvh)

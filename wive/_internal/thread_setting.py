@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 from wive import _cpu
 from wive._internal import arguments
+from wive._internal.process_lock import PROCESS_LOCK
 
 VARIABLE = "WIVE_NUM_THREADS"
 
@@ -23,8 +24,10 @@ def set_threads(count: int | None) -> None:
     Raises ValueError if count is less than 1, TypeError if it is no integer.
     """
     global _asked
-    _asked = arguments.threads(count)
-    _cpu.set_thread_count(_asked)
+    asked = arguments.threads(count)
+    with PROCESS_LOCK:
+        _asked = asked
+        _cpu.set_thread_count(asked)
 
 
 @contextlib.contextmanager
@@ -34,12 +37,14 @@ def at_most(count: int | None) -> Iterator[None]:
     For calls that have no `threads=`: unpickling builds a tree, and verifying reads all of one. None changes
     nothing.
     """
-    if count is not None and not 0 < _asked <= count:
-        _cpu.set_thread_count(count)
+    with PROCESS_LOCK:
+        if count is not None and not 0 < _asked <= count:
+            _cpu.set_thread_count(count)
     try:
         yield
     finally:
-        _cpu.set_thread_count(_asked)
+        with PROCESS_LOCK:
+            _cpu.set_thread_count(_asked)
 
 
 def set_by_environment() -> None:

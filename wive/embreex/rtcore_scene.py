@@ -44,16 +44,17 @@ class EmbreeScene:
         self._accuracy: AccuracyOption = "watertight" if robust else "fast"
         self._scene = Scene(np.zeros((0, 3), np.float32), np.zeros((0, 3), np.int32))
         self._meshes: list[tuple[Floats, NDArray[np.int32]]] = []
-        self._normals: NDArray[np.float32] | None = None  # of the tree's triangles, from when they are needed
+        # Of the triangles of a tree, from when they are needed.
+        self._normals: tuple[Scene, NDArray[np.float32]] | None = None
 
     @property
     def scene(self) -> Scene:
         """The `wive.Scene` over all meshes added so far, one after another."""
         if not self.is_committed:
-            if self._meshes:
-                self._scene = Scene.from_meshes(self._meshes, accuracy=self._accuracy)
-            self._normals = None
-            self.is_committed = 1
+            meshes = self._meshes.copy()
+            if meshes:
+                self._scene = Scene.from_meshes(meshes, accuracy=self._accuracy)
+            self.is_committed = int(len(meshes) == len(self._meshes))
         return self._scene
 
     def add(self, vertices: Floats, triangles: NDArray[np.int32]) -> int:
@@ -138,9 +139,10 @@ class EmbreeScene:
             return hits.geom_prim
         u, v = np.where(hits.mask, hits.uv.T, np.float32(0))
         tfar = np.where(hits.mask, hits.t, ends)
-        if self._normals is None:
-            self._normals = _normals(scene)
-        normals = self._normals[hits.prim]
+        kept = self._normals
+        if kept is None or kept[0] is not scene:
+            kept = self._normals = scene, _normals(scene)
+        normals = kept[1][hits.prim]
         return {"u": u, "v": v, "Ng": normals, "tfar": tfar, "primID": hits.geom_prim, "geomID": hits.geom}
 
 

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import io
-import warnings
 from collections.abc import Callable, Hashable
 
 import numpy as np
 from numpy.typing import NDArray
 
+from wive._internal.process_lock import without_warnings
 from wive._internal.room import expect_room
 
 Texels = NDArray[np.uint8]  # (height,width,3), sRGB, the top row first
@@ -51,18 +51,16 @@ class Textures:
             return None
         file = io.BytesIO(source) if isinstance(source, bytes) else source
         try:
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore")
-                with Image.open(file, formats=FORMATS) as image:
-                    pixels = image.width * image.height
-                    if not 0 < pixels <= min(MOST_PIXELS, self._left):
-                        return None
-                    self._left -= pixels
-                    expect_room(BYTES_OF_PIXEL * pixels, np.uint8)
-                    if image.mode.startswith("I"):  # of 16 bits, of which Pillow would keep the lower
-                        gray = np.clip(np.asarray(image).astype(np.int64) >> 8, 0, 255)
-                        return np.repeat(gray.astype(np.uint8)[..., None], 3, axis=2)
-                    return np.array(image.convert("RGB"))
+            with without_warnings(), Image.open(file, formats=FORMATS) as image:
+                pixels = image.width * image.height
+                if not 0 < pixels <= min(MOST_PIXELS, self._left):
+                    return None
+                self._left -= pixels
+                expect_room(BYTES_OF_PIXEL * pixels, np.uint8)
+                if image.mode.startswith("I"):  # of 16 bits, of which Pillow would keep the lower
+                    gray = np.clip(np.asarray(image).astype(np.int64) >> 8, 0, 255)
+                    return np.repeat(gray.astype(np.uint8)[..., None], 3, axis=2)
+                return np.array(image.convert("RGB"))
         except MemoryError:
             raise
         except Exception:  # of decoders, which raise what they like on damaged bytes
