@@ -5,20 +5,18 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable, Iterator, Sequence
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import DTypeLike
 
 from wive._internal import arguments
 from wive._internal.files import PathLike, check_output, file_name, named_error
+from wive._internal.flusher import one_thread
 from wive._internal.hit_files import Column, HitFile
 from wive._internal.progress import Progress, ProgressOption, checked_progress, progress_of
 from wive._internal.ray_files import Raw, RayReader, Rays, RaySource, open_rays, raw_format
 from wive.scene import Scene
-
-if TYPE_CHECKING:
-    from concurrent.futures import Executor
 
 Query = Literal["intersect", "occluded", "count", "intersect_all"]
 # Rays per piece: 16 to 64 MB of rays and hits; of all hits, of which a ray may have many, fewer.
@@ -273,10 +271,3 @@ def _tell_kept(error: BaseException, file: HitFile) -> None:
         raise KeyboardInterrupt(kept) from None
     if kept and isinstance(error, MemoryError):
         raise MemoryError(f"{error or 'not enough memory'}; {kept}") from error
-
-
-def one_thread() -> Executor:
-    """A helper thread, joined at the end of the block."""
-    from concurrent.futures import ThreadPoolExecutor
-
-    return ThreadPoolExecutor(1, thread_name_prefix="wive-stream")

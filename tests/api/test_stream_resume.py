@@ -254,10 +254,11 @@ def test_an_output_that_is_replaced_keeps_its_mode(tmp_path):
 
 
 KILLED = """
-import numpy as np, sys, wive
-from wive._internal import hit_files
-hit_files.CHECKPOINT = 0
-wive.trace(wive.load("scene.wive"), "rays.npy", sys.argv[1], query=sys.argv[2], piece=20)
+import sys, time, wive
+from wive._internal import hit_files, progress
+hit_files.CHECKPOINT = progress.PERIOD = 0
+slowly = lambda done, total: time.sleep(0.02)
+wive.trace(wive.load("scene.wive"), "rays.npy", sys.argv[1], query=sys.argv[2], piece=20, progress=slowly)
 """
 
 

@@ -14,30 +14,24 @@ import sys
 import time
 import zlib
 from contextlib import suppress
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from wive._internal.files import PathLike, atomic_write, file_name, named_error, put_in_place
+from wive._internal.files import PathLike, file_name, named_error, put_in_place
+from wive._internal.flusher import Flusher
+from wive._internal.hit_records import RECORD, STATE, expect_common, record_of, state_of, write_state
 from wive._internal.lines import one_line
 from wive._internal.npz_layout import NPY_HEAD, NpzLayout, Stored, npy_head
 
 # Seconds of work that a killed run loses.
 CHECKPOINT = 5.0
-PART, CONTENT, STATE, RECORD = ".part", "content", "state.json", "trace.json"
+PART, CONTENT = ".part", "content"
 COPIED = 1 << 22
-# What an interrupted run must have in common with the one that goes on.
-COMMON = {
-    "wive": "version of wive",
-    "accuracy": "accuracy",
-    "precision": "precision",
-    "mesh": "mesh",
-    "query": "query",
-    "touching": "touching",
-    "rays": "number of rays",
-    "kind": "kind of rays",
-}
+# Bytes that are brought to the disk at once.
+FLUSHED = 1 << 24
 
 
 class Column(NamedTuple):
@@ -64,24 +58,31 @@ class HitFile:
         self.part = self._final + PART
         self._content = os.path.join(self.part, CONTENT)
         self._about, self._count, self._ragged = about, int(about["rays"]), ragged
-        self._columns = [*columns, Column("offsets", np.dtype(np.int64))] if ragged else columns
+        self._columns = columns
+        # Columns that grow, in files of their own until they are copied into the npz file. One may grow in
+        # the npz file itself, behind the offsets, whose number is known: the largest, to copy least.
+        self._beside: list[Column] = []
+        if ragged:
+            largest = max(columns, key=lambda column: column.row)
+            others = [column for column in columns if column is not largest]
+            self._columns = [Column("offsets", np.dtype(np.int64)), largest, *others]
+            self._beside = [] if self.is_folder else others
+        self._layout = None if self.is_folder else NpzLayout(self._stored(0 if ragged else self._count))
         self._files: dict[str, int] = {}
         self._begins = {column.name: NPY_HEAD for column in self._columns}
         self._lock, self._goes_on = -1, False
-        self._kept = time.monotonic()
+        self._flusher, self._unflushed, self._kept = Flusher(), 0, time.monotonic()
         self.done = self.hits = 0
         self._rows = 0
         self.read: list[str] = []
         self._crcs: dict[str, int] = {}
-        # An npz file of known size is written in place; what grows is in files of its own first.
-        self._layout = None if ragged or self.is_folder else NpzLayout(self._stored(self._count))
 
     def begin(self, resume: bool) -> list[str] | None:
         """Make or find the folder; the checksums of the `done` rays, None if all is complete and in place."""
         if resume and not os.path.exists(self.part) and os.path.exists(self._final):
-            record = self._complete()
+            record = record_of(self._final, self.is_folder)
             if record is not None:
-                self._expect_common(record["about"], f"output {self.name!r} is complete, but")
+                expect_common(record["about"], self._about, f"output {self.name!r} is complete, but")
                 self.done, self.hits, self.read = self._count, record["hits"], record["read"]
                 return None
         if self.is_folder and os.path.exists(self._final) and not is_empty_folder(self._final):
@@ -96,7 +97,7 @@ class HitFile:
 
     def write(self, arrays: dict[str, NDArray[Any]], rays: int, read: list[str]) -> None:
         """Write the hits of the next rays; `read` are the checksums of all rays up to these."""
-        found, crcs = len(arrays["prim"]), {}
+        found, crcs, written = len(arrays["prim"]), dict(self._crcs), 0
         for column in self._columns:
             array = arrays[column.name]
             row = self.done + 1 if column.name == "offsets" else self._rows
@@ -106,18 +107,20 @@ class HitFile:
             _write_at(
                 self._files[column.name], memoryview(data), self._begins[column.name] + row * column.row
             )
-            if self._layout is not None:
-                crcs[column.name] = zlib.crc32(data, self._crcs[column.name])
+            written += 0 if column in self._beside else len(data)
+            if column.name in crcs:
+                crcs[column.name] = zlib.crc32(data, crcs[column.name])
         self._crcs = crcs  # here, so that an error above leaves all of the record as it was
         self._rows += found
         self.hits += found if self._ragged else int(np.count_nonzero(arrays["prim"] >= 0))
         self.done += rays
         self.read = read
-        if time.monotonic() - self._kept >= CHECKPOINT:
-            self._keep()
+        self._unflushed += written
+        self._flush()
 
     def finish(self) -> None:
         """Put the output in place."""
+        self._flusher.wait()
         record = {"about": self._about, "hits": self.hits, "read": self.read}
         text = json.dumps(record, sort_keys=True).encode()
         stored = self._stored(self._rows)
@@ -129,18 +132,16 @@ class HitFile:
                 os.fsync(file.fileno())
             os.replace(self._content, self._final)
         else:
-            if self._layout is None:
-                self._end_files(stored)
-                self._keep()
             made = os.path.join(self._content, "npz")
-            with open(made, "r+b" if self._layout is not None else "w+b") as file:
-                layout = self._layout or NpzLayout(stored)
-                crcs = self._crcs if self._layout is not None else self._join(layout, file.fileno())
+            with open(made, "r+b") as file:
+                layout = NpzLayout(stored)
+                crcs = self._join(layout, file.fileno()) if self._ragged else self._crcs
                 for place, head in layout.heads(crcs):
                     _write_at(file.fileno(), memoryview(head), place)
                 tail = layout.tail(crcs, text)
                 _write_at(file.fileno(), memoryview(tail), layout.end)
                 os.ftruncate(file.fileno(), layout.end + len(tail))
+                self._flusher.wait()
                 put_in_place(file, made, self._final)
         self._remove()
 
@@ -152,8 +153,8 @@ class HitFile:
         if keep:
             try:
                 self._keep()
-            except OSError:  # no room for the record: the one before may be there
-                keep = self._state() is not None
+            except (OSError, MemoryError):  # no room for the record: the one before may be there
+                keep = state_of(self.part) is not None
         if not keep:
             self._remove()
             return ""
@@ -179,8 +180,8 @@ class HitFile:
         if not {STATE, CONTENT}.issuperset(os.listdir(self.part)):
             self.close()
             raise FileExistsError(f"folder {self.part!r} is in the way: choose another output, or move it")
-        state = self._state()
-        if state is None:
+        state = state_of(self.part)
+        if state is None or not os.path.isdir(self._content):
             shutil.rmtree(self._content, ignore_errors=True)
             return
         try:
@@ -189,7 +190,7 @@ class HitFile:
                     f"{one_line(self.part)}: holds {state['done']:,} rays of an interrupted run: "
                     "resume it, or delete the folder"
                 )
-            self._expect_common(state["about"], f"{one_line(self.part)}: the interrupted run")
+            expect_common(state["about"], self._about, f"{one_line(self.part)}: the interrupted run")
         except BaseException:
             self.close()
             raise
@@ -200,20 +201,32 @@ class HitFile:
     def _open(self) -> None:
         """Open the files, of their whole size if that is known."""
         os.makedirs(self._content, exist_ok=True)
-        if self._layout is not None:
-            self._begins = {name: begin + NPY_HEAD for name, begin in self._layout.begins.items()}
-            shared = self._opened("npz", self._layout.end)
-            self._files = {column.name: shared for column in self._columns}
-            heads = {array.name: npy_head(array.dtype, array.shape) for array in self._layout.arrays}
-            for name, head in heads.items():
-                _write_at(shared, memoryview(head), self._begins[name] - NPY_HEAD)
-            self._crcs = self._crcs or {name: zlib.crc32(head) for name, head in heads.items()}
-            return
-        for column in self._columns:
-            size = 0 if self._ragged else NPY_HEAD + self._count * column.row
-            self._files[column.name] = self._opened(f"{column.name}.npy", size)
+        if self._layout is None:
+            for column in self._columns:
+                size = 0 if self._ragged else NPY_HEAD + self._count * column.row
+                self._files[column.name] = self._opened(f"{column.name}.npy", size)
+        else:
+            beside = {column.name for column in self._beside}
+            arrays = [array for array in self._layout.arrays if array.name not in beside]
+            end = self._layout.begins[arrays[-1].name] + arrays[-1].size
+            shared = self._opened("npz", end)
+            self._files = {array.name: shared for array in arrays}
+            self._files |= {name: self._opened(f"{name}.npy", 0) for name in beside}
+            for array in arrays:
+                self._begins[array.name] = self._layout.begins[array.name] + NPY_HEAD
+            if not self._ragged:
+                self._write_heads(arrays)
+                self._crcs = self._crcs or {
+                    array.name: zlib.crc32(npy_head(array.dtype, array.shape)) for array in arrays
+                }
         if self._ragged:
-            _write_at(self._files["offsets"], memoryview(bytes(8)), NPY_HEAD)
+            _write_at(self._files["offsets"], memoryview(bytes(8)), self._begins["offsets"])
+
+    def _write_heads(self, arrays: list[Stored]) -> None:
+        """Write the heads of the npy files."""
+        for array in arrays:
+            head = npy_head(array.dtype, array.shape)
+            _write_at(self._files[array.name], memoryview(head), self._begins[array.name] - NPY_HEAD)
 
     def _opened(self, name: str, size: int) -> int:
         file = os.open(os.path.join(self._content, name), os.O_RDWR | os.O_CREAT, 0o666)
@@ -228,21 +241,27 @@ class HitFile:
 
     def _end_files(self, stored: list[Stored]) -> None:
         """Write the headers and cut the files to their sizes."""
+        self._write_heads(stored)
         for array in stored:
             file = self._files[array.name]
-            _write_at(file, memoryview(npy_head(array.dtype, array.shape)), 0)
             os.ftruncate(file, array.size)
             os.fsync(file)
 
     def _join(self, layout: NpzLayout, made: int) -> dict[str, int]:
-        """Copy the files to their places in the npz file; their checksums."""
+        """Copy what grew beside the npz file to its place there; the checksums of all."""
+        self._write_heads(layout.arrays)
+        beside = {column.name for column in self._beside}
         crcs = {}
-        for array in layout.arrays:
-            crc, place = 0, layout.begins[array.name]
-            for begin in range(0, array.size, COPIED):
-                data = os.pread(self._files[array.name], min(COPIED, array.size - begin), begin)
+        for array in sorted(layout.arrays, key=lambda array: array.name not in beside):
+            crc, begin = 0, self._begins[array.name] - NPY_HEAD
+            for at in range(0, array.size, COPIED):
+                data = os.pread(self._files[array.name], min(COPIED, array.size - at), begin + at)
                 crc = zlib.crc32(data, crc)
-                _write_at(made, memoryview(data), place + begin)
+                if array.name in beside:
+                    _write_at(made, memoryview(data), layout.begins[array.name] + at)
+                    self._unflushed += len(data)
+                if self._unflushed >= FLUSHED and self._flusher.is_idle:
+                    self._flush_output()
             crcs[array.name] = crc
         return crcs
 
@@ -256,10 +275,23 @@ class HitFile:
             for column in self._columns
         ]
 
-    def _keep(self) -> None:
-        """Write down how far the files are, once they are on the disk."""
-        for file in set(self._files.values()):
-            os.fsync(file)
+    def _flush(self) -> None:
+        """Bring what is written to the disk, and the record when it is due, unless that is being done."""
+        if not self._flusher.is_idle:
+            return
+        if time.monotonic() - self._kept >= CHECKPOINT:
+            self._begin_keeping()
+        elif self._unflushed >= FLUSHED:
+            self._flush_output()
+
+    def _flush_output(self) -> None:
+        """Begin to bring the output to the disk, without what is copied into it at the end."""
+        beside = {column.name for column in self._beside}
+        self._flusher.begin(file for name, file in self._files.items() if name not in beside)
+        self._unflushed = 0
+
+    def _begin_keeping(self) -> None:
+        """Begin to write down how far the files are, as soon as they are on the disk."""
         state = {
             "about": self._about,
             "done": self.done,
@@ -268,42 +300,13 @@ class HitFile:
             "read": self.read,
             "crcs": self._crcs,
         }
-        with atomic_write(os.path.join(self.part, STATE)) as record:
-            record.write(json.dumps(state).encode())
-        self._kept = time.monotonic()
+        self._flusher.begin(self._files.values(), partial(write_state, self.part, state))
+        self._unflushed, self._kept = 0, time.monotonic()
 
-    def _state(self) -> dict[str, Any] | None:
-        """What was written down; None if nothing was."""
-        try:
-            with open(os.path.join(self.part, STATE), "rb") as file:
-                state = json.load(file)
-        except (OSError, ValueError):
-            return None
-        return state if isinstance(state, dict) and os.path.isdir(self._content) else None
-
-    def _complete(self) -> dict[str, Any] | None:
-        """The record of a complete output; None if it has none."""
-        import zipfile
-
-        try:
-            if self.is_folder:
-                with open(os.path.join(self._final, RECORD), "rb") as file:
-                    text = file.read()
-            else:
-                with zipfile.ZipFile(self._final) as archive:
-                    text = archive.comment
-            record = json.loads(text)
-            return record if {"about", "hits", "read"} <= record.keys() else None
-        except (AttributeError, OSError, ValueError, zipfile.BadZipFile):
-            return None
-
-    def _expect_common(self, about: dict[str, Any], what: str) -> None:
-        for key, label in COMMON.items():
-            if about.get(key) != self._about[key]:
-                seen = "" if key == "mesh" else f" ({about.get(key)} then, {self._about[key]} now)"
-                raise ValueError(
-                    f"{what} was of another {label}{seen}: give the same, delete it, or choose another output"
-                )
+    def _keep(self) -> None:
+        """Write down how far the files are."""
+        self._begin_keeping()
+        self._flusher.wait()
 
     def refuse_other_rays(self) -> None:
         """Raise ValueError: the rays that were read before are not those of this run."""
@@ -314,6 +317,7 @@ class HitFile:
 
     def close(self) -> None:
         """Let go of the folder, as it is."""
+        self._flusher.close()
         for file in {*self._files.values(), self._lock} - {-1}:
             os.close(file)
         self._files, self._lock = {}, -1
