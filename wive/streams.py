@@ -13,7 +13,8 @@ from numpy.typing import DTypeLike
 from wive._internal import arguments
 from wive._internal.files import PathLike, check_output, file_name, named_error
 from wive._internal.flusher import one_thread
-from wive._internal.hit_files import Column, HitFile
+from wive._internal.hit_columns import Column
+from wive._internal.hit_files import HitFile
 from wive._internal.progress import Progress, ProgressOption, checked_progress, progress_of
 from wive._internal.ray_files import Raw, RayReader, Rays, RaySource, open_rays, raw_format
 from wive.scene import Scene

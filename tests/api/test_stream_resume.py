@@ -1,6 +1,7 @@
 """`wive.trace` writes a whole output or none, and a run that goes on after an interruption loses nothing."""
 
 import errno
+import json
 import os
 import shutil
 import signal
@@ -13,7 +14,7 @@ import pytest
 from support.ray_files import COUNT, FORMS, arrays_of, content_of, small_scene, some_rays, write_rays
 
 import wive
-from wive._internal import hit_files, progress
+from wive._internal import hit_columns, hit_files, progress
 
 OUTPUTS = ["hits.npz", "hits/"]
 QUERIES = ["intersect", "intersect_all"]
@@ -91,7 +92,7 @@ def test_a_full_disk_leaves_no_half_file_and_what_was_done_can_go_on(
     tmp_path, monkeypatch, output, query, writes
 ):
     trace(tmp_path, "whole" + output, query)
-    write, left = hit_files._write_at, writes
+    write, left = hit_columns._write_at, writes
 
     def full(file, data, place):
         nonlocal left
@@ -102,7 +103,7 @@ def test_a_full_disk_leaves_no_half_file_and_what_was_done_can_go_on(
         write(file, data, place)
 
     with monkeypatch.context() as patched:
-        patched.setattr(hit_files, "_write_at", full)
+        patched.setattr(hit_columns, "_write_at", full)
         with pytest.raises(OSError, match="No space left on device") as error:
             trace(tmp_path, output, query)
     assert output in str(error.value) and "\n" not in str(error.value)
@@ -251,6 +252,56 @@ def test_an_output_that_is_replaced_keeps_its_mode(tmp_path):
     trace(tmp_path)
     assert (tmp_path / "hits.npz").stat().st_mode & 0o777 == 0o640
     assert len(arrays_of(tmp_path / "hits.npz")["t"]) == COUNT
+
+
+@pytest.mark.parametrize("lost", [1, 2, 5, 6])
+def test_what_the_disk_lost_is_traced_again(tmp_path, monkeypatch, lost):
+    """A system tells of a lost write once, by an error of fsync; later calls succeed."""
+    trace(tmp_path, "whole.npz")
+    flush, folder, left, kept = os.fsync, tmp_path / "hits.npz.part", lost, -1
+
+    def failing(file):
+        nonlocal left, kept
+        left -= 1
+        if left == 0:
+            state = folder / "state.json"
+            kept = json.loads(state.read_bytes())["done"] if state.exists() else 0
+            raise OSError(errno.EIO, os.strerror(errno.EIO))
+        flush(file)
+
+    monkeypatch.setattr(hit_files, "CHECKPOINT", 0)
+    with monkeypatch.context() as patched:
+        patched.setattr(os, "fsync", failing)
+        with pytest.raises(OSError, match=r"hits\.npz"):
+            trace(tmp_path, progress=lambda done, total: time.sleep(0.02))
+    assert kept >= 0
+    assert trace(tmp_path, resume=True).resumed == kept
+    assert content_of(tmp_path / "hits.npz") == content_of(tmp_path / "whole.npz")
+
+
+def test_output_is_brought_to_the_disk_while_rays_are_traced(tmp_path, monkeypatch):
+    flush, flushed = os.fsync, []
+
+    def told(file):
+        flushed.append(os.fstat(file).st_size)
+        flush(file)
+
+    monkeypatch.setattr(hit_files, "FLUSHED", 1)
+    monkeypatch.setattr(os, "fsync", told)
+    in_time = []
+    trace(tmp_path, progress=lambda done, total: (time.sleep(0.02), in_time.append(len(flushed))))
+    assert in_time[0] <= 1 and in_time[-2] > 3
+
+
+def test_an_interrupted_run_of_another_form_is_refused(tmp_path):
+    interrupt(tmp_path)
+    name = tmp_path / "hits.npz.part" / "state.json"
+    state = json.loads(name.read_bytes())
+    del state["form"]
+    name.write_text(json.dumps(state))
+    with pytest.raises(ValueError, match="of another version of wive: delete it, or choose"):
+        trace(tmp_path, resume=True)
+    assert name.exists()
 
 
 KILLED = """

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from support.ray_files import COUNT, FORMS, arrays_of, content_of, small_scene, some_rays, write_rays
 
-from wive._internal import hit_files
+from wive._internal import hit_columns
 from wive.cli import main
 
 
@@ -40,11 +40,11 @@ def test_trace_reads_every_form_of_rays(folder, capfd, form, output):
 
 
 @pytest.mark.parametrize("option", [(), ("--all",)])
-@pytest.mark.parametrize("writes", [7, 20, 36])
+@pytest.mark.parametrize("writes", [7, 20, 32])
 def test_ctrl_c_in_mid_write_keeps_what_is_done(folder, capsys, monkeypatch, option, writes):
     name, _ = write_rays("npy", folder, some_rays())
     assert trace(name, "-o", "whole.npz", *option) == 0
-    write, left = hit_files._write_at, writes
+    write, left = hit_columns._write_at, writes
 
     def interrupted(file, data, place):
         nonlocal left
@@ -56,7 +56,7 @@ def test_ctrl_c_in_mid_write_keeps_what_is_done(folder, capsys, monkeypatch, opt
 
     command = name, "-o", "hits.npz", *option, "--piece", 100
     with monkeypatch.context() as patched:
-        patched.setattr(hit_files, "_write_at", interrupted)
+        patched.setattr(hit_columns, "_write_at", interrupted)
         assert trace(*command) == 130
     error = capsys.readouterr().err
     assert error.startswith("wive: interrupted: ") and error.count("\n") == 1

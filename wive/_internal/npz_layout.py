@@ -22,6 +22,8 @@ VERSION, UNIX = 45, 3 << 8
 FIRST_DAY = 1 << 5 | 1  # of 1980, as np.savez has it
 IN_EXTRA, MANY = 0xFFFFFFFF, 0xFFFF
 MODE = 0o600 << 16
+# Zip's polynomial without its leading term, and 1: the highest power of x in the lowest bit.
+POLYNOMIAL, ONE = 0xEDB88320, 1 << 31
 
 
 class Stored(NamedTuple):
@@ -47,6 +49,27 @@ def npy_head(dtype: np.dtype[Any], shape: tuple[int, ...]) -> bytes:
     text = f"{{'descr': {dtype.str!r}, 'fortran_order': False, 'shape': {shape!r}, }}"
     head = b"\x93NUMPY\x01\x00" + struct.pack("<H", NPY_HEAD - 10)
     return head + text.encode().ljust(NPY_HEAD - len(head) - 1) + b"\n"
+
+
+def joined_crc(first: int, second: int, length: int) -> int:
+    """The CRC-32 of data and `length` bytes behind it, of their CRCs: first * x^(8 length) + second."""
+    power, square = first, ONE >> 8
+    while length:
+        if length & 1:
+            power = _product(power, square)
+        square, length = _product(square, square), length >> 1
+    return power ^ second
+
+
+def _product(one: int, other: int) -> int:
+    """The product of polynomials modulo zip's."""
+    found = 0
+    while one:
+        if one & ONE:
+            found ^= other
+        one = one << 1 & 0xFFFFFFFF
+        other = other >> 1 ^ (POLYNOMIAL if other & 1 else 0)
+    return found
 
 
 class NpzLayout:
