@@ -15,6 +15,7 @@ from wive._internal.files import PathLike, check_output, file_name, named_error
 from wive._internal.flusher import one_thread
 from wive._internal.hit_columns import Column
 from wive._internal.hit_files import HitFile
+from wive._internal.hit_records import RECORD_FORM
 from wive._internal.progress import Progress, ProgressOption, checked_progress, progress_of
 from wive._internal.ray_files import Raw, RayReader, Rays, RaySource, open_rays, raw_format
 from wive.scene import Scene
@@ -246,6 +247,7 @@ def _hit_file(scene: Scene, reader: RayReader, output: PathLike, query: str, how
     _, vertices, faces = scene._bvh.checksums()
     about = {
         "wive": wive.__version__,
+        "record": RECORD_FORM,
         "mesh": f"{vertices:016x}{faces:016x}",
         "accuracy": scene.accuracy,
         "precision": scene.precision,

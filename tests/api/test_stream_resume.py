@@ -297,9 +297,9 @@ def test_an_interrupted_run_of_another_form_is_refused(tmp_path):
     interrupt(tmp_path)
     name = tmp_path / "hits.npz.part" / "state.json"
     state = json.loads(name.read_bytes())
-    del state["form"]
+    del state["about"]["record"]
     name.write_text(json.dumps(state))
-    with pytest.raises(ValueError, match="of another version of wive: delete it, or choose"):
+    with pytest.raises(ValueError, match="was of another version of wive: give the same, delete it"):
         trace(tmp_path, resume=True)
     assert name.exists()
 

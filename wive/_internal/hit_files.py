@@ -29,8 +29,6 @@ CHECKPOINT = 5.0
 PART, CONTENT = ".part", "content"
 # Bytes that are written before they are brought to the disk, which takes some ms however few they are.
 FLUSHED = 1 << 24
-# Of the record of an interrupted run.
-FORM = 2
 
 
 class HitFile:
@@ -150,11 +148,6 @@ class HitFile:
                     f"{one_line(self.part)}: holds {state['done']:,} rays of an interrupted run: "
                     "resume it, or delete the folder"
                 )
-            if state.get("form") != FORM:
-                raise ValueError(
-                    f"{one_line(self.part)}: the interrupted run was of another version of wive: "
-                    "delete it, or choose another output"
-                )
             expect_common(state["about"], self._about, f"{one_line(self.part)}: the interrupted run")
         except BaseException:
             self.close()
@@ -173,7 +166,6 @@ class HitFile:
     def _begin_keeping(self) -> None:
         """Begin to write down how far the files are, as soon as they are on the disk."""
         state = {
-            "form": FORM,
             "about": self._about,
             "done": self.done,
             "rows": self._rows,

@@ -10,9 +10,12 @@ from typing import Any
 from wive._internal.files import atomic_write
 
 STATE, RECORD = "state.json", "trace.json"
+# Of what is written down, and of checksums.
+RECORD_FORM = 2
 # What an interrupted run must have in common with the one that goes on.
 COMMON = {
     "wive": "version of wive",
+    "record": "version of wive",
     "accuracy": "accuracy",
     "precision": "precision",
     "mesh": "mesh",
@@ -60,7 +63,7 @@ def expect_common(then: Mapping[str, Any], now: Mapping[str, Any], what: str) ->
     """Raise ValueError if a run was of another mesh or other options than those of now."""
     for key, label in COMMON.items():
         if then.get(key) != now[key]:
-            seen = "" if key == "mesh" else f" ({then.get(key)} then, {now[key]} now)"
+            seen = "" if key in ("mesh", "record") else f" ({then.get(key)} then, {now[key]} now)"
             raise ValueError(
                 f"{what} was of another {label}{seen}: give the same, delete it, or choose another output"
             )

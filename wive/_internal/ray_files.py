@@ -22,13 +22,15 @@ from wive._internal.precision import FLOAT64
 EXPECTED = "a file of rays, (n,6) or (n,8) in an .npy or `origins` and `directions` in an .npz"
 NAMES = ("ox", "oy", "oz", "dx", "dy", "dz", "tmin", "tmax")
 SKIPPED = "_"
-# Bytes of rays under one checksum.
-BLOCK = 1 << 20
+# Bytes of rays under one checksum: whole rows of 6 or 8 numbers of 4 or 8 bytes, few enough to stay in a
+# cache while they are read, summed up and split into origins and directions.
+BLOCK = 3 << 17
 
 Array = NDArray[Any]
 Rays = tuple[Any, Any, Any, Any]  # origins, directions, tmin, tmax
 LIMITS = 0.0, np.inf
 RaySource = PathLike | ArrayLike | Sequence[ArrayLike]
+Taken = Callable[[int, "list[RunningChecksum]"], Rays]
 
 
 class Raw(NamedTuple):
@@ -70,21 +72,15 @@ def raw_format(dtype: DTypeLike, columns: str | Sequence[str] | None = None) -> 
 class RayReader:
     """Rays, read in order; there are `count`."""
 
-    def __init__(
-        self, count: int, sources: list[Rows], taken: Callable[[list[Array]], Rays], kind: str
-    ) -> None:
-        """`taken` makes rays of rows of the sources; `kind` says of what dtypes and shapes these are."""
+    def __init__(self, count: int, sources: list[Rows], taken: Taken, kind: str) -> None:
+        """`taken` reads so many rays of the sources; `kind` says of what dtypes and shapes these are."""
         self.count, self.kind = count, kind
         self._checksums = [RunningChecksum() for _ in sources]
         self._sources, self._taken = sources, taken
 
     def read(self, count: int, checksummed: bool = False) -> Rays:
         """The next rays. They count in `checksum` if all before did."""
-        blocks = [source.read(count) for source in self._sources]
-        if checksummed:
-            for checksum, block in zip(self._checksums, blocks, strict=True):
-                checksum.add(block)
-        return self._taken(blocks)
+        return self._taken(count, self._checksums if checksummed else [])
 
     def skip(self, count: int) -> None:
         """Leave the next rays out."""
@@ -216,17 +212,27 @@ def _of_table(rows: Rows, names: Sequence[str]) -> RayReader:
     """Rays whose numbers are columns of one array."""
     places = {name: i for i, name in enumerate(names)}
     vectors = [[places[name] for name in NAMES[:3]], [places[name] for name in NAMES[3:6]]]
+    dtype = rows.dtype.newbyteorder("=")
+    step = max(1, BLOCK // (rows.dtype.itemsize * len(names)))
 
-    def taken(blocks: list[Array]) -> Rays:
-        (table,) = blocks
-        origins, directions = (_columns(table, columns) for columns in vectors)
-        limits = [
-            np.ascontiguousarray(table[:, places[name]]) if name in places else usual
-            for name, usual in zip(NAMES[6:], LIMITS, strict=True)
-        ]
-        return origins, directions, limits[0], limits[1]
+    def taken(count: int, checksums: list[RunningChecksum]) -> Rays:
+        split = [np.empty((count, 3), dtype) for _ in vectors]
+        limits = [np.empty(count, dtype) if name in places else None for name in NAMES[6:]]
+        for begin in range(0, count, step):
+            table = rows.read(min(step, count - begin))
+            for checksum in checksums:
+                checksum.add(table)
+            place = slice(begin, begin + len(table))
+            for whole, columns in zip(split, vectors, strict=True):
+                for axis, column in enumerate(columns):  # numbers one by one: NumPy is slow on short rows
+                    whole[place, axis] = table[:, column]
+            for limit, name in zip(limits, NAMES[6:], strict=True):
+                if limit is not None:
+                    limit[place] = table[:, places[name]]
+        low, high = (usual if limit is None else limit for limit, usual in zip(limits, LIMITS, strict=True))
+        return split[0], split[1], low, high
 
-    checked_rays(*taken([np.empty((0, len(names)), rows.dtype)]), FLOAT64)
+    checked_rays(*taken(0, []), FLOAT64)
     return RayReader(rows.shape[0], [rows], taken, f"{rows.dtype.str} {','.join(names)}")
 
 
@@ -236,13 +242,19 @@ def _of_parts(parts: list[Rows | Any]) -> RayReader:
     counts = [part.shape[0] for part in parts[:2] if isinstance(part, Rows)]
     count = max(counts, default=1)
 
-    def taken(blocks: list[Array]) -> Rays:
+    def joined(blocks: list[Array]) -> Rays:
         left = iter(blocks)
         origins, directions, low, high = (next(left) if isinstance(part, Rows) else part for part in parts)
         return origins, directions, low, high
 
+    def taken(count: int, checksums: list[RunningChecksum]) -> Rays:
+        blocks = [source.read(count) for source in sources]
+        for checksum, block in zip(checksums, blocks, strict=False):
+            checksum.add(block)
+        return joined(blocks)
+
     # What is wrong with dtypes and shapes is wrong with no row as well.
-    checked_rays(*taken([np.empty((0, *source.shape[1:]), source.dtype) for source in sources]), FLOAT64)
+    checked_rays(*joined([np.empty((0, *source.shape[1:]), source.dtype) for source in sources]), FLOAT64)
     if any(len(source.shape) > 0 and source.shape[0] != count for source in sources):
         if len(set(counts)) > 1:
             raise ValueError(f"origins and directions must be equally many, got {counts[0]} and {counts[1]}")
@@ -259,16 +271,3 @@ def _of_parts(parts: list[Rows | Any]) -> RayReader:
         for part in parts
     ]
     return RayReader(count, sources, taken, " ".join(kinds))
-
-
-def _columns(table: Array, columns: list[int]) -> Array:
-    """Three columns of a C-contiguous table, C-contiguous; neighbours are copied as one item per row."""
-    first, size = columns[0], table.dtype.itemsize
-    if columns != [first, first + 1, first + 2] or not table.flags.c_contiguous:
-        return np.ascontiguousarray(table[:, columns])
-    items = (
-        np.ndarray(len(table), f"V{3 * size}", table.data, first * size, (table.shape[1] * size,))
-        if len(table)
-        else np.empty(0, f"V{3 * size}")
-    )
-    return items.copy().view(table.dtype).reshape(-1, 3)
