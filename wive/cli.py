@@ -13,7 +13,7 @@ from wive._internal import commands
 from wive._internal.picture import ALBEDOS, SHADINGS, SKIES, Settings
 from wive._internal.pictures.image_files import FORMATS
 from wive.backend import CPU_BACKENDS, WARP
-from wive.streams import PIECE, PIECE_ALL
+from wive.streams import PIECE, PIECE_ALL, PIECE_PER_THREAD
 
 BAD_INPUT = 2
 INTERRUPTED = 130
@@ -195,7 +195,8 @@ def _add_trace(subparsers: "argparse._SubParsersAction[_Parser]") -> None:
         "--piece",
         type=int,
         metavar="RAYS",
-        help=f"rays per piece; default: {PIECE:,}, with --all {PIECE_ALL:,}",
+        help=f"rays per piece; default: {PIECE_PER_THREAD:,} per thread, {PIECE:,} at most; "
+        f"with --all {PIECE_ALL:,}",
     )
     parser.add_argument("--all", action="store_true", help="every hit of each ray; also writes offsets")
     parser.add_argument(

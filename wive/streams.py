@@ -10,6 +10,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import DTypeLike
 
+from wive import _cpu
 from wive._internal import arguments
 from wive._internal.files import PathLike, check_output, file_name, named_error
 from wive._internal.flusher import one_thread
@@ -20,9 +21,12 @@ from wive._internal.progress import Progress, ProgressOption, checked_progress, 
 from wive._internal.ray_files import Raw, RayReader, Rays, RaySource, open_rays, raw_format
 from wive.scene import Scene
 
+# Makes the query of a piece, when its rays are there.
+ReadyQuery = Callable[[], Callable[..., Any]]
 Query = Literal["intersect", "occluded", "count", "intersect_all"]
-# Rays per piece: 16 to 64 MB of rays and hits; of all hits, of which a ray may have many, fewer.
-PIECE, PIECE_ALL = 1 << 20, 1 << 17
+# Rays per piece, per thread: some 30 ms of work, beside which starting threads costs nothing; what few
+# threads read and write stays in the caches. At most 64 MB; of all hits, of which a ray may have many, fewer.
+PIECE_PER_THREAD, PIECE, PIECE_ALL = 1 << 17, 1 << 20, 1 << 17
 
 
 class Traced(NamedTuple):
@@ -61,7 +65,7 @@ def stream(
         columns: what the numbers of a ray are, in order: "ox,oy,oz,dx,dy,dz" unless given; there may be tmin,
             tmax, and _ for what is to be skipped. For raw files.
         first: the ray to begin with.
-        piece: rays per piece; 2**20 unless given, or 2**17 of all hits.
+        piece: rays per piece; unless given 2**17 per thread, at most 2**20, or 2**17 of all hits.
         progress: as for `Scene`, in rays.
         how: other keywords are those of the query, such as `threads`.
 
@@ -74,7 +78,7 @@ def stream(
     ...     total += np.count_nonzero(hits.mask)
     """
     ask = _query_of(scene, query, how)
-    size = _piece_size(piece, query)
+    size = _piece_size(scene, piece, query, how)
     begin, format_ = arguments.integer("first", first, 0), _raw(raw, columns)
     checked_progress(progress)
 
@@ -124,7 +128,7 @@ def trace(
     if query not in ("intersect", "intersect_all"):
         raise ValueError(f"query must be one of intersect, intersect_all to be written, got {query!r:.40}")
     ask = _query_of(scene, query, how)
-    size, format_ = _piece_size(piece, query), _raw(raw, columns)
+    size, format_ = _piece_size(scene, piece, query, how), _raw(raw, columns)
     checked_progress(progress)
     arguments.flag("resume", resume)
     inputs = [rays] if isinstance(rays, str | bytes) or hasattr(rays, "__fspath__") else []
@@ -156,8 +160,11 @@ def check_hits_output(output: PathLike, inputs: Sequence[Any] = ()) -> str:
     return check_output(name, ".npz", inputs)
 
 
-def _query_of(scene: Scene, query: str, how: dict[str, Any]) -> Callable[..., Any]:
-    """The scene's query with the options, which are checked by a query of no rays."""
+def _query_of(scene: Scene, query: str, how: dict[str, Any]) -> ReadyQuery:
+    """Makes the scene's query with the options, which are checked by a query of no rays.
+
+    How many threads it uses is found then: the checksums of a stream's rays are no reason to use fewer.
+    """
     if not isinstance(scene, Scene):
         raise TypeError(f"scene must be a wive.Scene, got {type(scene).__name__}")
     arguments.choice("query", query, ("intersect", "occluded", "count", "intersect_all"))
@@ -167,13 +174,24 @@ def _query_of(scene: Scene, query: str, how: dict[str, Any]) -> Callable[..., An
     ask: Callable[..., Any] = getattr(still, query)
     nothing = np.empty((0, 3), still.vertices.dtype)
     ask(nothing, nothing, **how)
-    return lambda *rays: ask(*rays, **how)
+    if how.get("threads") is not None or "threads" in still._tracer.lacks:
+        return lambda: lambda *rays: ask(*rays, **how)
+
+    def ready() -> Callable[..., Any]:
+        count = {"threads": _cpu.thread_count()}
+        return lambda *rays: ask(*rays, **how | count)
+
+    return ready
 
 
-def _piece_size(piece: int | None, query: str) -> int:
-    if piece is None:
-        return PIECE_ALL if query == "intersect_all" else PIECE
-    return arguments.integer("piece", piece, 1)
+def _piece_size(scene: Scene, piece: int | None, query: str, how: dict[str, Any]) -> int:
+    if piece is not None:
+        return arguments.integer("piece", piece, 1)
+    if query == "intersect_all":
+        return PIECE_ALL
+    if "threads" in scene._tracer.lacks:
+        return PIECE
+    return min(PIECE, PIECE_PER_THREAD * _cpu.thread_count(how.get("threads") or 0))
 
 
 def _raw(raw: DTypeLike | None, columns: str | Sequence[str] | None) -> Raw | None:
@@ -185,7 +203,7 @@ def _raw(raw: DTypeLike | None, columns: str | Sequence[str] | None) -> Raw | No
 
 
 def _traced(
-    ask: Callable[..., Any],
+    ask: ReadyQuery,
     reader: RayReader,
     first: int,
     piece: int,
@@ -206,9 +224,10 @@ def _traced(
         for i, begin in enumerate(starts):
             assert coming is not None
             rays, checksum = coming.result()
+            query = ask()  # while no rays are read
             if i + 1 < len(starts):
                 coming = helper.submit(read, starts[i + 1])
-            answer = ask(*rays)
+            answer = query(*rays)
             del rays
             yield begin, answer, checksum
             del answer
@@ -217,7 +236,7 @@ def _traced(
 
 
 def _write_all(
-    file: HitFile, ask: Callable[..., Any], reader: RayReader, piece: int, progress: Progress | None
+    file: HitFile, ask: ReadyQuery, reader: RayReader, piece: int, progress: Progress | None
 ) -> None:
     """Trace the rays that are left; a piece is written while the next one is traced."""
     names = ("t", "prim", "uv", "offsets")

@@ -2,12 +2,15 @@
 
 import subprocess
 import sys
+import time
 
 import numpy as np
 import pytest
 from support.ray_files import COUNT, FORMS, small_scene, some_rays, write_rays
 
 import wive
+from wive import _cpu
+from wive._internal import ray_files
 
 QUERIES = ["intersect", "occluded", "count", "intersect_all"]
 
@@ -42,6 +45,24 @@ def test_every_query_streams(tmp_path, query):
     name, _ = write_rays("npy", tmp_path, rays)
     for first, answer in wive.stream(scene, name, query=query, piece=300, threads=1):
         same(answer, getattr(scene, query)(*(array[first : first + 300] for array in rays)))
+
+
+def test_all_cores_trace_while_the_next_rays_are_summed_up(tmp_path, monkeypatch):
+    name, _ = write_rays("npy", tmp_path, some_rays())
+    scene, cores, used = small_scene(), _cpu.thread_count(), []
+    long = np.zeros(1 << 26, np.uint8)
+    query = wive.Scene.intersect
+
+    def told(self, origins, directions, *limits, **how):
+        if len(origins):
+            time.sleep(0.002)
+            used.append(how.get("threads") or _cpu.thread_count())
+        return query(self, origins, directions, *limits, **how)
+
+    monkeypatch.setattr(ray_files.RunningChecksum, "add", lambda self, array: _cpu.checksum(long, 1))
+    monkeypatch.setattr(wive.Scene, "intersect", told)
+    wive.trace(scene, name, tmp_path / "hits.npz", piece=300)
+    assert used == [cores] * 4
 
 
 @pytest.mark.parametrize("first", [0, 1, 700, COUNT, COUNT + 5])
