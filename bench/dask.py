@@ -89,10 +89,10 @@ def contenders(
     import wive.dask
 
     low, high = scene.bounds
-    sizes = ((chunk,) * (count // chunk), (3,))
-    form = {"chunks": sizes, "dtype": np.float32, "meta": np.empty((0, 3), np.float32)}
-    made = [da.map_blocks(random_vectors, kind, low, high, **form) for kind in ("origins", "directions")]
-    arrays = compute(*made, scheduler="threads")
+    form = {"dtype": np.float32, "meta": np.empty((0, 0, 3), np.float32)}
+    # One array, so that a worker has both the origins and the directions of a chunk.
+    made = da.map_blocks(random_rays, low, high, chunks=((2,), (chunk,) * (count // chunk), (3,)), **form)
+    arrays = compute(made[0], made[1], scheduler="threads")
     in_process = [da.from_array(array, chunks=(chunk, 3), name=False) for array in arrays]
     far = itertools.count(1)
     with (
@@ -101,8 +101,14 @@ def contenders(
         ) as cluster,
         Client(cluster) as client,
     ):
-        in_workers = [client.persist(one) for one in made]
-        wait(in_workers)
+        addresses = list(client.scheduler_info(n_workers=-1)["workers"])
+        share = count // chunk // len(addresses) * chunk  # of rays, for each worker
+        parts = [
+            client.persist([made[kind, i * share : (i + 1) * share] for kind in (0, 1)], workers=[address])
+            for i, address in enumerate(addresses)
+        ]
+        wait(parts)
+        in_workers = [da.concatenate(halves) for halves in zip(*parts, strict=True)]
 
         def on_processes() -> object:
             hits = wive.dask.intersect(scene, in_workers[0], in_workers[1], tmax=FAR * next(far))
@@ -130,28 +136,25 @@ def contenders(
 
 def making_seconds(scene: wive.Scene, chunk: int) -> float:
     """Seconds to make the rays of a chunk."""
-    about = {None: {"chunk-location": (0, 0), "chunk-shape": (chunk, 3)}}
+    about = {None: {"chunk-location": (0, 0, 0), "chunk-shape": (2, chunk, 3)}}
     start = time.perf_counter()
     low, high = scene.bounds
-    for kind in ("origins", "directions"):
-        random_vectors(kind, low, high, about)
+    random_rays(low, high, about)
     return time.perf_counter() - start
 
 
-def random_vectors(
-    kind: str,
+def random_rays(
     low: NDArray[np.float32],
     high: NDArray[np.float32],
     block_info: Mapping[None, report.Row] | None = None,
 ) -> NDArray[np.float32]:
-    """The vectors of a chunk, of a seed of their own."""
+    """(2,n,3) origins and directions of a chunk, of a seed of their own."""
     assert block_info is not None
     about = block_info[None]
-    shape: tuple[int, int] = about["chunk-shape"]
-    random = np.random.default_rng((about["chunk-location"][0], kind == "origins"))
-    if kind == "directions":
-        return random.standard_normal(shape, np.float32)
-    return np.asarray(low + (high - low) * random.random(shape, np.float32), np.float32)
+    shape: tuple[int, int, int] = about["chunk-shape"]
+    random = np.random.default_rng(about["chunk-location"][1])
+    origins = low + (high - low) * random.random(shape[1:], np.float32)
+    return np.stack([np.asarray(origins, np.float32), random.standard_normal(shape[1:], np.float32)])
 
 
 def parse_options(options: Sequence[str]) -> argparse.Namespace:

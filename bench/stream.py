@@ -1,8 +1,9 @@
 """Rays of files in pieces, all cores: the seconds that one batch in memory takes over those of a stream.
 
 Above 1 the stream is faster. "read" is `wive.stream` of an .npy file, the others are `wive.trace` of a file
-to a file; "all" is every hit. In memory, arrays of rays are there before and hits stay there. Files are read
-from the page cache. What is written is deleted after each round; the system writes it to the disk meanwhile.
+to a file, which ends when the output is on the disk; "all" is every hit, of a quarter of the rays; "one
+thread" traces on one thread on both sides. In memory, arrays of rays are there before and hits stay there.
+Files are read from the page cache. What is written is deleted after each round.
 """
 
 import argparse
@@ -10,7 +11,7 @@ import shutil
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -25,13 +26,27 @@ USUAL = ("terrain_jacksboro", "city_san_francisco")
 QUICK_SCENES = ("terrain_2k",)
 COLUMNS = ["scene", "triangles", "form", "mrays", "ratio", "low", "high"]
 Query = Literal["intersect", "intersect_all"]
-# Name, rays, output and query; no output: read alone.
-FORMS: tuple[tuple[str, str, str, Query], ...] = (
-    ("read", "rays.npy", "", "intersect"),
-    ("npy to npz", "rays.npy", "hits.npz", "intersect"),
-    ("npy to folder", "rays.npy", "hits/", "intersect"),
-    ("npz to npz", "rays.npz", "hits.npz", "intersect"),
-    ("all, npy to npz", "rays.npy", "hits.npz", "intersect_all"),
+RAYS, QUICK_RAYS = 1 << 23, 20_000
+
+
+class Form(NamedTuple):
+    """What is streamed."""
+
+    name: str
+    rays: str
+    output: str  # "" if hits are not written
+    query: Query = "intersect"
+    threads: int | None = None
+
+
+FORMS = (
+    Form("read", "rays.npy", ""),
+    Form("npy to npz", "rays.npy", "hits.npz"),
+    Form("npy to folder", "rays.npy", "hits/"),
+    Form("npz to npz", "rays.npz", "hits.npz"),
+    Form("npy to npz, one thread", "rays.npy", "hits.npz", threads=1),
+    Form("all, npy to npz", "few.npy", "hits.npz", "intersect_all"),
+    Form("all, npy to folder", "few.npy", "hits/", "intersect_all"),
 )
 
 
@@ -39,8 +54,8 @@ def main(options: Sequence[str]) -> None:
     """Runs the bench with command-line options."""
     chosen = parse_options(options)
     scenes = SceneFolder(chosen.scene_dir).select(chosen.scenes, QUICK_SCENES if chosen.quick else USUAL)
-    effort = QUICK if chosen.quick else Effort(least=3, most=5)
-    count = 20_000 if chosen.quick else 1 << 22
+    effort = QUICK if chosen.quick else Effort(least=3, most=3)
+    count = QUICK_RAYS if chosen.quick else RAYS
     rows: list[report.Row] = []
     for name in scenes.names:
         mesh = SceneFolder(chosen.scene_dir).load(name)
@@ -48,6 +63,7 @@ def main(options: Sequence[str]) -> None:
         rays = random_rays(mesh, count, np.random.default_rng(17))
         with tempfile.TemporaryDirectory() as folder:
             np.save(Path(folder, "rays.npy"), np.column_stack(rays))
+            np.save(Path(folder, "few.npy"), np.column_stack(rays)[: count // 4])
             np.savez(Path(folder, "rays.npz"), origins=rays[0], directions=rays[1])
             for form in FORMS:
                 rows.append(row_of(name, scene, rays, Path(folder), form, effort))
@@ -62,31 +78,34 @@ def row_of(
     scene: wive.Scene,
     rays: tuple[Any, Any],
     folder: Path,
-    form: tuple[str, str, str, Query],
+    form: Form,
     effort: Effort,
 ) -> report.Row:
     """One scene and form of files."""
-    label, source, output, query = form
+    if form.query == "intersect_all":
+        rays = rays[0][: len(rays[0]) // 4], rays[1][: len(rays[1]) // 4]
 
     def stream() -> None:
-        if not output:
-            for _ in wive.stream(scene, folder / source):
+        if not form.output:
+            for _ in wive.stream(scene, folder / form.rays, threads=form.threads):
                 pass
             return
-        wive.trace(scene, folder / source, f"{folder}/{output}", query=query)
+        output = f"{folder}/{form.output}"
+        wive.trace(scene, folder / form.rays, output, query=form.query, threads=form.threads)
 
     def streamed() -> float:
         seconds = wall_timed(stream)()
-        if output:
-            made = folder / output
+        if form.output:
+            made = folder / form.output
             shutil.rmtree(made) if made.is_dir() else made.unlink()
         return seconds
 
-    found = compare(streamed, wall_timed(lambda: getattr(scene, query)(*rays)), effort)
+    batch = wall_timed(lambda: getattr(scene, form.query)(*rays, threads=form.threads))
+    found = compare(streamed, batch, effort)
     return {
         "scene": name,
         "triangles": len(scene),
-        "form": label,
+        "form": form.name,
         "mrays": len(rays[0]) / found.our_seconds / 1e6,
         "ratio": found.ratio,
         "low": found.low,
