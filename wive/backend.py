@@ -63,13 +63,21 @@ def backends() -> dict[str, Backend]:
     return found
 
 
+# What to pass instead of a kind of device for a backend.
+PLACES = {"cpu": ": 'auto' is the fastest on the CPU"}
+PLACES |= dict.fromkeys(("cuda", "gpu"), ": device 'cuda:0' is the first GPU")
+
+
 def resolve_backend(name: str, device: str | None = None) -> tuple[str, str | None]:
     """The usable backend and device meant; "auto" is the first usable CPU backend, and with a device Warp.
 
     The device of a CPU backend is None. Raises ValueError or TypeError if there is no such backend or device
     or this machine can't run it.
     """
-    choice("backend", name, ("auto", *CPU_BACKENDS, WARP))
+    try:
+        choice("backend", name, ("auto", *CPU_BACKENDS, WARP))
+    except ValueError as error:
+        raise ValueError(f"{error}{PLACES.get(str(name).partition(':')[0], '')}") from None
     if device is not None:
         if not isinstance(device, str):
             raise TypeError(f"device must be a name such as 'cpu' or 'cuda:0', got {device!r:.60}")

@@ -12,6 +12,7 @@ from wive._internal import arguments
 from wive._internal.arrays import Library
 from wive._internal.distant import Moved
 from wive._internal.error_bounds import t_error_bounds
+from wive._internal.gradients import warn_of_lost_gradients
 from wive._internal.host_arrays import host_array
 from wive._internal.interpolation import interpolated, vertex_values_of
 from wive._internal.known_meshes import OfMesh, mesh_sizes
@@ -125,6 +126,7 @@ class OnSurface(OnTriangles):
 
         >>> smooth = hits.interpolate(vertex_normals)
         """
+        warn_of_lost_gradients("interpolate", vertex_values=vertex_values)
         values = vertex_values_of(host_array("vertex_values", vertex_values), len(self.vertices))
         return interpolated(values, self.faces, self.prim, self.uv)
 

@@ -13,9 +13,10 @@ from wive._internal.npzfile import check_input
 from wive._internal.precision import real_asked
 from wive._internal.progress import ProgressOption, checked_progress
 from wive._internal.several_meshes import Joined
-from wive._internal.storage import Options, is_saved_scene, read_scene
+from wive._internal.storage import OPEN_MESH, Options, is_saved_scene, read_scene
 from wive._internal.stored_scenes import Place, is_stored_file, open_file, source_of
 from wive.backend import resolve_backend
+from wive.meshfile import named_mesh
 from wive.scene import Scene, tracer_of
 
 
@@ -84,6 +85,8 @@ def _loaded(
     name = one_line(file_name(path))
     if is_stored_file(path):
         return _of_tree(cls, open_file(path), name, replaced)
+    if named_mesh(name) and not is_saved_file(path):
+        raise ValueError(f"{name}: not a scene saved by wive, but a mesh by its name: {OPEN_MESH}")
     vertices, faces, geoms, options = read_scene(path)
     chosen = cast(dict[str, Any], {**options, **replaced})
     try:

@@ -26,6 +26,7 @@ from wive._internal.tree_file import is_image
 TEXT = ("obj", "off", "ply", "stl")
 # Modules of other readers.
 OTHERS = {"npz": "npz", "3mf": "threemf.reader", "dae": "dae.reader"}
+GLTF = ("gltf", "glb", "vrm")
 # Vertices and triangles are numbered by int32.
 MOST = 2**31 - 1
 LONGEST_NAME = 4096
@@ -75,6 +76,11 @@ def load_mesh(
         return _checked(_read(kind, data, name, folder, real), name, real)
 
 
+def named_mesh(name: str) -> bool:
+    """Whether the name is that of a mesh by its extension; .npz, which saved scenes may have, is none."""
+    return os.path.splitext(name)[1].lower().lstrip(".") in {*TEXT, *OTHERS, *GLTF} - {"npz"}
+
+
 def _no_mesh(name: str) -> ValueError:
     return ValueError(f"{name}: is a scene that Scene.save wrote and no mesh: open it with wive.load(path)")
 
@@ -120,7 +126,7 @@ def _read_to_end(source: Readable, name: str) -> object:
 
 def _read(kind: str, data: bytes, name: str, folder: str | None, real: Real) -> Mesh:
     """Import the reader of this kind and run it."""
-    if kind in ("gltf", "glb", "vrm"):
+    if kind in GLTF:
         from wive._internal.formats.gltf import reader as gltf
 
         return gltf.read(data, name, folder)

@@ -20,7 +20,7 @@ from wive._internal.pictures.surroundings import Sight, reaches_sky, stands_insi
 from wive._internal.pictures.viewpoint import default_camera
 from wive._internal.progress import ProgressOption, checked_progress, part, reported
 from wive.camera import Camera, unit_vector
-from wive.scene import Scene
+from wive.scene import Scene, expect_scene
 from wive.sensors import PinholeCamera
 
 if TYPE_CHECKING:
@@ -120,8 +120,7 @@ def render_counted(
     scene: Scene, camera: Perspective | None, settings: Settings, *, progress: ProgressOption
 ) -> Picture:
     """The picture that `render` returns."""
-    if not isinstance(scene, Scene):
-        raise TypeError(f"scene must be a wive.Scene, got {type(scene).__name__}")
+    expect_scene(scene)
     with _cpu.DefaultFloats():  # the caller's floating-point environment would round otherwise
         scene = scene._at_rest()
         _cpu.expect_memory(settings.height * settings.width * 3 * np.dtype(np.float32).itemsize)

@@ -77,7 +77,9 @@ class Scene(Queries, PointQueries):
                 else, lists included, a float32 scene. Meshes of trimesh and Open3D hold float64.
             backend: "auto" (the fastest CPU backend this machine has) or a name in `wive.backends()`.
             device: the device of backend "warp", by Warp's names: "cpu", "cuda:0", ...; None is the first
-                CUDA device, else "cpu". A device alone implies backend "warp"; CPU backends take none.
+                CUDA device, else "cpu". A device alone implies backend "warp"; CPU backends take none. "cpu"
+                is Warp's CPU device, which uses one core and is for developing kernels: to trace on CPUs,
+                leave `device` out.
             accuracy: "watertight" (rays never slip between triangles that share an edge or vertex), "fast",
                 or "exact" (hits, their order, t and uv are those of exact arithmetic, rounded once; vertices
                 that float32 can't hold, whatever their dtype, are refused).
@@ -356,7 +358,10 @@ class Scene(Queries, PointQueries):
 
     def __repr__(self) -> str:
         """Size and options, and where the tree is stored if it is."""
-        options = f"backend={self.backend!r}, accuracy={self.accuracy!r}, precision={self.precision!r}"
+        device = "" if self.device is None else f", device={self.device!r}"
+        options = (
+            f"backend={self.backend!r}{device}, accuracy={self.accuracy!r}, precision={self.precision!r}"
+        )
         geoms = self._tracer.geoms
         several = "" if geoms is None else f" in {len(geoms)} meshes"
         source = self._bvh.source
@@ -410,6 +415,14 @@ class Scene(Queries, PointQueries):
     @property
     def _bvh(self) -> _cpu.Bvh:
         return self._tracer.bvh
+
+
+def expect_scene(value: object) -> None:
+    """Raise TypeError if `value`, given as the argument `scene`, is none."""
+    if not isinstance(value, Scene):
+        is_name = isinstance(value, (str, bytes, os.PathLike))
+        opened = ": wive.Scene.from_file opens meshes and saved scenes" if is_name else ""
+        raise TypeError(f"scene must be a wive.Scene, got {type(value).__name__}{opened}")
 
 
 def tracer_of(

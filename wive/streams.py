@@ -19,7 +19,7 @@ from wive._internal.hit_files import HitFile
 from wive._internal.hit_records import RECORD_FORM
 from wive._internal.progress import Progress, ProgressOption, checked_progress, progress_of
 from wive._internal.ray_files import Raw, RayReader, Rays, RaySource, open_rays, raw_format
-from wive.scene import Scene
+from wive.scene import Scene, expect_scene
 
 # Makes the query of a piece, when its rays are there.
 ReadyQuery = Callable[[], Callable[..., Any]]
@@ -165,8 +165,7 @@ def _query_of(scene: Scene, query: str, how: dict[str, Any]) -> ReadyQuery:
 
     How many threads it uses is found then: the checksums of a stream's rays are no reason to use fewer.
     """
-    if not isinstance(scene, Scene):
-        raise TypeError(f"scene must be a wive.Scene, got {type(scene).__name__}")
+    expect_scene(scene)
     arguments.choice("query", query, ("intersect", "occluded", "count", "intersect_all"))
     if "progress" in how or "stats" in how:
         raise ValueError("stats is not for streams: leave it out")

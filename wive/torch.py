@@ -59,8 +59,10 @@ def intersect(
             None takes the scene's own. Rays meet the planes that these give, so they should be those that the
             scene was made of or refitted to.
 
-    Raises ValueError or TypeError as `Scene.intersect`, and if `vertices` does not fit the scene and rays.
+    Raises ValueError or TypeError as `Scene.intersect`, if rays or vertices are no tensors, and if `vertices`
+    does not fit the scene and rays.
     """
+    _expect_tensors(origins=origins, directions=directions, vertices=vertices)
     limits = (limit.detach() if isinstance(limit, torch.Tensor) else limit for limit in (tmin, tmax))
     options: dict[str, Any] = {"threads": threads, "in_flight": in_flight, "lanes": lanes}
     hits: Any = scene.intersect(origins.detach(), directions.detach(), *limits, **options)
@@ -92,6 +94,13 @@ def _corners(scene: Scene, prim: torch.Tensor, vertices: torch.Tensor | None) ->
 
     of_scene, faces = (wp.to_torch(array) for array in scene._tracer.mesh)  # type: ignore[attr-defined]
     return (of_scene if vertices is None else vertices)[faces[first]]
+
+
+def _expect_tensors(**values: torch.Tensor | None) -> None:
+    for name, value in values.items():
+        if not (isinstance(value, torch.Tensor) or (value is None and name == "vertices")):
+            kind = type(value).__name__
+            raise TypeError(f"{name} must be a torch.Tensor, got {kind}: torch.as_tensor makes one")
 
 
 def _expect_fitting(scene: Scene, prim: torch.Tensor, vertices: torch.Tensor) -> None:

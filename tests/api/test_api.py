@@ -265,7 +265,9 @@ def test_a_scene_has_its_size_bounds_and_options(backend):
     assert scene.memory >= 320 * 36
     np.testing.assert_array_equal(scene.bounds, [vertices.min(axis=0), vertices.max(axis=0)])
     assert (scene.backend, scene.accuracy) == (backend, "fast")
-    assert repr(scene) == f"Scene(320 triangles, backend='{backend}', accuracy='fast', precision='float32')"
+    device = ", device='cpu'" if backend == "warp" else ""
+    options = f"backend='{backend}'{device}, accuracy='fast', precision='float32'"
+    assert repr(scene) == f"Scene(320 triangles, {options})"
     assert repr(scene.intersect([[0, 0, 0], [9, 9, 9]], [1, 1, 1.1])) == "Hits(2 rays, 1 hit)"
 
 

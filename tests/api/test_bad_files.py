@@ -70,7 +70,7 @@ def header(**changes) -> np.ndarray:
 @pytest.mark.parametrize(
     ("arrays", "expected"),
     [
-        ({"x": [1]}, "not a scene saved by wive"),
+        ({"x": [1]}, "not a scene saved by wive, but a mesh: wive.Scene.from_file reads meshes"),
         ({"header": np.array("hello")}, "not a scene saved by wive"),
         ({"header": header(format="other")}, "not a scene saved by wive"),
         ({"header": header(options={})}, "not a scene saved by wive"),
@@ -97,6 +97,19 @@ def test_loading_what_is_no_file_or_no_npz(tmp_path):
         with pytest.raises(ValueError, match="not a scene saved by wive") as error:
             wive.load(path)
         assert str(path) in message(error)
+
+
+@pytest.mark.parametrize("name", ["part.obj", "part.PLY", "part.stl", "part.off", "part.glb", "part.3mf"])
+def test_loading_a_mesh_file_names_what_reads_it(tmp_path, name):
+    path = tmp_path / name
+    path.write_text("v 0 0 0\n")
+    with pytest.raises(ValueError) as error:
+        wive.load(path)
+    assert message(error) == (
+        f"{path}: not a scene saved by wive, but a mesh by its name: wive.Scene.from_file reads meshes"
+    )
+    wive.Scene(VERTICES, [[0, 1, 2]]).save(path)  # the content counts, not the name
+    assert len(wive.load(path)) == 1
 
 
 def test_a_damaged_npy_header_is_damage_and_not_a_python_error(tmp_path):

@@ -111,7 +111,14 @@ def test_a_vertex_that_is_no_place_is_named_by_its_index(value, dtype):
         (
             {"backend": "cuda"},
             ValueError,
-            "backend must be one of auto, avx512, avx2, scalar, warp in this version of wive, got 'cuda'",
+            "backend must be one of auto, avx512, avx2, scalar, warp in this version of wive, got 'cuda': "
+            "device 'cuda:0' is the first GPU",
+        ),
+        (
+            {"backend": "cpu"},
+            ValueError,
+            "backend must be one of auto, avx512, avx2, scalar, warp in this version of wive, got 'cpu': "
+            "'auto' is the fastest on the CPU",
         ),
         (
             {"backend": 3},

@@ -123,3 +123,55 @@ def test_a_scene_is_fitted_to_measured_distances() -> None:
             guess.grad.zero_()
         scene.refit(guess.detach().numpy().copy())
     assert losses[-1] < losses[0] / 1000
+
+
+def lossy(scene: wive.Scene) -> list[tuple[str, str, object]]:
+    """Calls that lose a gradient: the argument that asks for it, the method, the call."""
+    rays = [ray.to(torch.float32) for ray in rays_inside()]
+    still = [ray.detach() for ray in rays]
+    hits = scene.intersect(*still)
+    values = torch.ones(len(scene.vertices), requires_grad=True)
+    return [
+        ("origins", "intersect", lambda: scene.intersect(*rays)),
+        ("directions", "intersect", lambda: scene.intersect(still[0], rays[1], stats=True)),
+        ("tmax", "intersect", lambda: scene.intersect(*still, tmax=rays[0][:, 0])),
+        ("origins", "intersect_all", lambda: scene.intersect_all(*rays)),
+        ("points", "closest", lambda: scene.closest(rays[0])),
+        ("points", "signed_distance", lambda: scene.signed_distance(rays[0])),
+        ("vertex_values", "interpolate", lambda: hits.interpolate(values)),
+        ("vertex_values", "interpolate", lambda: scene.closest(still[0]).interpolate(values)),
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("number", range(8))
+def test_a_gradient_that_a_query_would_lose_is_a_warning_at_the_callers_line(
+    backend: str, number: int
+) -> None:
+    scene = scene_of(backend, "float32")
+    name, method, call = lossy(scene)[number]
+    with pytest.warns(
+        UserWarning, match=f"^{name} requires gradients, which {method} does not carry: "
+    ) as said:
+        call()
+    assert [warning.filename for warning in said] == [__file__]
+    assert ("use wive.torch.intersect" in str(said[0].message)) == (method == "intersect")
+    with torch.no_grad():  # an error in these tests, if it warned
+        call()
+
+
+def test_answers_that_have_no_gradient_are_given_without_a_warning(backend: str) -> None:
+    scene, rays = scene_of(backend, "float32"), [ray.to(torch.float32) for ray in rays_inside()]
+    assert scene.occluded(*rays).all()
+    assert (scene.count(*rays) == 1).all()
+    assert scene.contains(rays[0]).all()
+
+
+@pytest.mark.parametrize("name", ["origins", "directions", "vertices"])
+def test_arrays_of_another_library_are_refused_by_name(name: str) -> None:
+    scene = scene_of("scalar")
+    origins, directions = rays_inside()
+    given = {"origins": origins, "directions": directions, "vertices": torch.tensor(scene.vertices)}
+    given[name] = given[name].detach().numpy()
+    with pytest.raises(TypeError) as error:
+        intersect(scene, **given)
+    assert str(error.value) == f"{name} must be a torch.Tensor, got ndarray: torch.as_tensor makes one"

@@ -164,7 +164,8 @@ def test_backends_lists_each_with_its_reason(capsys):
         (("render", "{ball}", "--fov", "0"), "fov must be between 0 and 180 degrees, got 0"),
         (
             ("render", "{ball}", "--backend", "gpu"),
-            "backend must be one of auto, avx512, avx2, scalar, warp in this version of wive, got 'gpu'",
+            "backend must be one of auto, avx512, avx2, scalar, warp in this version of wive, got 'gpu': "
+            "device 'cuda:0' is the first GPU",
         ),
         (
             ("render", "{ball}", "--device", "cuda:0", "--backend", "scalar"),

@@ -126,3 +126,14 @@ def test_trees_of_one_kind_share_a_type_and_others_do_not() -> None:
     assert tree.handle._cls is warp_kernels.Bvh
     assert dataclasses.replace(tree, accuracy="fast").handle._cls is warp_kernels.Bvh
     assert len({handle.key for handle in HANDLES.values()}) == len(HANDLES)
+
+
+def test_what_is_no_handle_and_no_tree_is_refused_with_what_to_pass() -> None:
+    scene = scene_of("watertight", "float32")
+    with pytest.raises(TypeError, match=r"got the Tree itself: pass scene\.tree\.handle$"):
+        launched(scene.tree)
+    with pytest.raises(
+        TypeError, match=r"^tree must be a wive\.warp_kernels\.Tree, got Scene: pass scene\.tree$"
+    ):
+        warp_kernels.check(scene)
+    assert "backend='warp', device='cpu', accuracy=" in repr(scene)

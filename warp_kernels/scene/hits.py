@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import warp as wp
 from numpy.typing import ArrayLike
 
+from wive._internal.gradients import warn_of_lost_gradients
 from wive._internal.spawn import ACCURACIES
 from wive.all_hits import row_of
 from wive.warp_kernels.lanes.precision import PRECISIONS
@@ -87,6 +88,7 @@ class WarpHits:
 
     def interpolate(self, vertex_values: ArrayLike) -> Any:
         """(n,) or (n,k) float32 or float64; (n,) vec2 or vec3 if k is 2 or 3."""
+        warn_of_lost_gradients("interpolate", vertex_values=vertex_values)
         with memory_errors():
             values = self._tracer.loader.vertex_values(vertex_values, len(self.vertices))
             rows = values if values.ndim == 2 else values.reshape((-1, 1))

@@ -68,6 +68,10 @@ class Tree:
             )
         return self.batch_handle
 
+    def __ctype__(self) -> Any:
+        """Raise TypeError: Warp asks arguments of kernels for this, and kernels take the handle."""
+        raise TypeError("kernels take the handle of a tree, got the Tree itself: pass scene.tree.handle")
+
     @property
     def memory(self) -> int:
         """Bytes of nodes and triangle blocks on the device."""
@@ -120,7 +124,10 @@ def check(tree: Tree) -> None:
     """Wait for the device; raise CorruptTreeError if a kernel could not traverse the tree.
 
     A kernel that took the handle for that of another tree is reported once and leaves the tree as it was.
+    Raises TypeError if `tree` is no tree, as a scene, whose tree is `scene.tree`.
     """
+    if not isinstance(tree, Tree):
+        raise TypeError(f"tree must be a wive.warp_kernels.Tree, got {type(tree).__name__}: pass scene.tree")
     check_memory(tree)
     if tree.error.numpy()[REFUSAL]:
         tree.error[REFUSAL : REFUSAL + 1].zero_()

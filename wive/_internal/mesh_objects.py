@@ -154,10 +154,26 @@ def kind_of(mesh: object) -> str:
     return f"{kind.__module__.partition('.')[0]}.{kind.__name__}".removeprefix("builtins.")
 
 
+def _is_whole_mesh(item: Any) -> bool:
+    """Whether an item of a list is a mesh object, or vertices and faces, and not a row of numbers."""
+    if isinstance(item, (list, tuple)):
+        return len(item) == 2 and all(map(_is_table, item))
+    return hasattr(item, "vertex") or any(all(hasattr(item, name) for name in names) for names in PAIRS)
+
+
+def _is_table(value: Any) -> bool:
+    """Whether a value has rows: an array of two axes, or a list of lists."""
+    if isinstance(value, (list, tuple)):
+        return len(value) > 0 and isinstance(value[0], (list, tuple, np.ndarray))
+    return getattr(value, "ndim", 0) == 2
+
+
 def _no_mesh(mesh: Any) -> str:
     """Why an object is no mesh."""
     if isinstance(mesh, (str, bytes, os.PathLike)):
         return f"faces must be given with vertices, got {shown(mesh)} alone: wive.Scene.from_file reads files"
+    if isinstance(mesh, (list, tuple)) and mesh and all(map(_is_whole_mesh, mesh)):
+        return "the mesh must be one mesh, got a list of meshes: take wive.Scene.from_meshes(meshes)"
     if isinstance(mesh, tuple) and len(mesh) == 2:
         return "faces must be given with vertices, got a tuple of both: wive.Scene(*mesh)"
     if isinstance(mesh, (np.ndarray, list, tuple)) or library_of(mesh) is not NUMPY:

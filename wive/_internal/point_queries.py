@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from wive._internal import arguments
 from wive._internal.arguments import Work
+from wive._internal.gradients import warn_of_lost_gradients
 from wive._internal.inside_scene import SIGNS, SignOption
 from wive._internal.points import Points, check_points
 from wive._internal.precision import Floats
@@ -58,6 +59,7 @@ class PointQueries:
         tracer = self._tracer
         work = _work(tracer, threads)
         checked = check_points(points, max_distance, tracer.backend, tracer.device)
+        warn_of_lost_gradients("closest", points=points)
         closest: Closest = _reported(progress, checked, lambda: tracer.closest(checked, work))
         return closest
 
@@ -111,6 +113,7 @@ class PointQueries:
         tracer, work = self._tracer, _work(self._tracer, threads)
         arguments.choice("sign", sign, SIGNS)
         checked = _checked(tracer, points)
+        warn_of_lost_gradients("signed_distance", points=points)
         distance: Floats = _reported(progress, checked, lambda: tracer.signed_distance(checked, sign, work))
         return distance
 

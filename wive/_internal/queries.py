@@ -10,9 +10,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from wive._internal import arguments
 from wive._internal.arguments import USUAL_WORK, LanesOption, Work
+from wive._internal.arrays import NUMPY
+from wive._internal.gradients import warn_of_lost_gradients
 from wive._internal.precision import Floats
 from wive._internal.progress import ProgressOption, checked_progress, reported
-from wive._internal.rays import Rays, check_rays, ray_count
+from wive._internal.rays import NAMES, Rays, check_rays, ray_count
 from wive._internal.segments import visible
 from wive._internal.shaped import query_shaped
 from wive._internal.spawn import spawn_from
@@ -26,6 +28,8 @@ if TYPE_CHECKING:
     from wive._internal.arguments import Counted, CountedAll, CountedCount, Given, Plain, PlainAll, PlainCount
 
 Answer = TypeVar("Answer")
+# Queries whose results change smoothly with their rays.
+SMOOTH = "intersect", "intersect_all"
 
 
 class Queries:
@@ -325,5 +329,7 @@ class Queries:
             options = threads, in_flight, lanes, stats, touching, max_bytes
             work = arguments.work(tracer.backend, tracer.lacks, *options)
         checked = check_rays(*rays, tracer.backend, tracer.device)
+        if checked.library is not NUMPY and query.__name__ in SMOOTH:
+            warn_of_lost_gradients(query.__name__, **dict(zip(NAMES, rays, strict=True)))
         answer, counters = query(checked, work) if checked.is_flat else query_shaped(query, checked, work)
         return answer if counters is None else (answer, counters)

@@ -35,6 +35,7 @@ OPTIONS = frozenset(Options.__annotations__) | {GEOMS}
 # The arrays of a saved scene's file.
 HEADER, MESH = "header", ("vertices", "faces")
 ZIP = b"PK\x03\x04"
+OPEN_MESH = "wive.Scene.from_file reads meshes"
 
 
 def write_scene(
@@ -87,7 +88,8 @@ def read_scene(path: PathLike) -> tuple[Floats, NDArray[np.int32], Geoms | None,
     with room_for(name), open_npz(path, "a scene saved by wive") as found:
         header = _header(found[HEADER]) if HEADER in found else None
         if header is None:
-            raise ValueError(no_scene)
+            is_mesh = HEADER not in found and all(name in found for name in MESH)
+            raise ValueError(f"{no_scene}, but a mesh: {OPEN_MESH}" if is_mesh else no_scene)
         _refuse_newer_file(name, header)
         given: Any = header.get("options")
         try:

@@ -19,7 +19,7 @@ from wive._internal.stored_scenes import Place
 from wive._internal.thread_setting import at_most
 from wive.all_hits import AllHits
 from wive.hits import Hits
-from wive.scene import Scene
+from wive.scene import Scene, expect_scene
 
 
 class CarriedScene:
@@ -64,8 +64,7 @@ _opening = threading.Lock()
 
 def carried(scene: Scene) -> tuple[CarriedScene, Delayed]:
     """The scene as it is now, whatever refits come, and its one place in a graph."""
-    if not isinstance(scene, Scene):
-        raise TypeError(f"scene must be a wive.Scene, got {type(scene).__name__}")
+    expect_scene(scene)
     found = CarriedScene(name_of(scene), scene._at_rest())
     return found, delayed(found, name=f"wive-scene-{found.name}", pure=True, traverse=False)
 
