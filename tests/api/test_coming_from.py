@@ -297,17 +297,24 @@ def test_warp(device: str) -> None:
         ours: wp.array2d(dtype=float),
     ):
         i = wp.tid()
-        origin, direction, max_t = origins[i], directions[i], 3.0
+        origin = origins[i]
+        direction = directions[i]
+        max_t = 3.0
         query = wp.mesh_query_ray(mesh, origin, direction, max_t)
         hit = wk.closest_hit(bvh, origin, direction, 0.0, max_t)
         ours[i, 0] = wp.where(hit.prim >= 0, 1.0, 0.0)
         theirs[i, 0] = wp.where(query.result, 1.0, 0.0)
         if hit.prim >= 0 and query.result:
-            ours[i, 1], theirs[i, 1] = float(hit.prim), float(query.face)
-            ours[i, 2], theirs[i, 2] = hit.t, query.t
-            ours[i, 3], theirs[i, 3] = hit.u, query.v
-            ours[i, 4], theirs[i, 4] = hit.v, 1.0 - query.u - query.v
-            ours[i, 5], theirs[i, 5] = hit.normal[0], query.normal[0]
+            ours[i, 1] = float(hit.prim)
+            theirs[i, 1] = float(query.face)
+            ours[i, 2] = hit.t
+            theirs[i, 2] = query.t
+            ours[i, 3] = hit.u
+            theirs[i, 3] = query.v
+            ours[i, 4] = hit.v
+            theirs[i, 4] = 1.0 - query.u - query.v
+            ours[i, 5] = hit.normal[0]
+            theirs[i, 5] = query.normal[0]
         ours[i, 6] = wp.where(wk.any_hit(bvh, origin, direction, 0.0, max_t), 1.0, 0.0)
         theirs[i, 6] = wp.where(wp.mesh_query_ray_anyhit(mesh, origin, direction, max_t), 1.0, 0.0)
         ours[i, 7] = float(wk.count_hits(bvh, origin, direction, 0.0, wp.inf))
