@@ -40,6 +40,17 @@ def test_the_default_is_path_outside_and_ao_inside(files, capsys):
         assert np.load(files / "a.npy").mean() > 0.25
 
 
+def test_a_picture_that_no_light_reaches_says_what_would_show_the_room(files, capsys):
+    for name, options, is_dark in (
+        ("room", ("--shading", "path"), True),
+        ("room", ("--shading", "path", "--sky", "black"), False),  # as asked
+        ("room", ("--shading", "ao"), False),
+        ("ball", ("--shading", "path"), False),
+    ):
+        assert run("render", files / f"{name}.npz", "-o", files / "a.npy", *SMALL, *options) == 0
+        assert ("--shading ao shows rooms" in capsys.readouterr().err) == is_dark
+
+
 def test_light_is_that_of_the_options(files):
     pictures = []
     for options in ((), ("--sky", "white"), ("--sky", "black", "--sun", 0, 1, 0), ("--exposure", "auto")):

@@ -59,6 +59,9 @@ def render_picture(options: Namespace) -> None:
     write_picture(output, picture.image, srgb=picture.shading != "normals")
     how = f"{_rate(picture.rays, seconds)}, {_tracer(scene)}, {len(scene):,} triangles"
     print(f"{output}: {picture.shading}, {how}")
+    if picture.shading == "path" and settings.sky != "black" and not np.median(picture.image[:, :, 1]) > 0:
+        hint = "hardly any path reached the sky, and most of the picture is black: --shading ao shows rooms"
+        print(f"wive: {hint}", file=sys.stderr)
 
 
 def trace_rays(options: Namespace) -> None:
