@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from wive import _cpu
 from wive._internal.arguments import choice
 from wive._internal.devices import resolve_device, warp_devices, warp_problem
+from wive._internal.scalars import shown
 
 CPU_BACKENDS = ("avx512", "avx2", "scalar")
 WARP = "warp"
@@ -80,7 +81,7 @@ def resolve_backend(name: str, device: str | None = None) -> tuple[str, str | No
         raise ValueError(f"{error}{PLACES.get(str(name).partition(':')[0], '')}") from None
     if device is not None:
         if not isinstance(device, str):
-            raise TypeError(f"device must be a name such as 'cpu' or 'cuda:0', got {device!r:.60}")
+            raise TypeError(f"device must be a name such as 'cpu' or 'cuda:0', got {shown(device)}")
         if name not in ("auto", WARP):
             raise ValueError(
                 f"device is only for backend 'warp', got device {device!r} with backend {name!r}: "

@@ -257,3 +257,30 @@ def test_numbers_beyond_float32_become_infinite_without_a_warning():
     scene = wive.Scene(*sphere(0))
     assert scene.occluded([0, 0, 0], [0.1, 0.2, 1], 0.0, 1e300).all()
     assert not scene.occluded([1e300, 0, 0], [1, 0, 0]).any()
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        lambda value: wive.write_picture(value, np.zeros((2, 2, 3), np.float32)),
+        lambda value: wive.Scene(VERTICES, FACES, device=value),
+        lambda value: wive.Scene(VERTICES, FACES, backend=value),
+        lambda value: wive.Scene(VERTICES, FACES, dtype=value),
+        lambda value: wive.Scene(VERTICES, FACES).save(value),
+        lambda value: wive.load(value),
+        lambda value: wive.load_mesh(b"v 0 0 0", file_type=value),
+        lambda value: wive.render(wive.Scene(VERTICES, FACES), shading=value),
+        lambda value: wive.render(wive.Scene(VERTICES, FACES), value),
+        lambda value: wive.estimate(value),
+        lambda value: wive.set_threads(value),
+        lambda value: wive.Camera((0, 0, 5), fov=value),
+        lambda value: wive.stream(value, "rays.npy"),
+        lambda value: wive.Scene.from_file(value),
+    ],
+)
+def test_an_array_in_place_of_another_argument_is_named_in_one_line(call):
+    """Arrays are printed on several lines."""
+    with pytest.raises((TypeError, ValueError)) as error:
+        call(np.zeros((3, 4, 5)))
+    assert "\n" not in str(error.value)
+    assert len(str(error.value)) < 300

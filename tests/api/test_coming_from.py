@@ -140,6 +140,10 @@ def test_embreex(library: str) -> None:
     TriangleMesh(theirs, vertices, indices)
     table.ours("scene = rtcore_scene.EmbreeScene()")
     same(table.ours("scene.run(origins, directions)"), theirs.run(origins, directions))
+    table.names["corners"] = vertices[indices]
+    TriangleMesh(theirs := rtcore_scene.EmbreeScene(), vertices[indices])
+    soup = table.ours("TriangleMesh(scene, corners)")
+    same(soup.intersect(origins, directions).geom_prim, theirs.run(origins, directions))
     TriangleMesh(theirs := rtcore_scene.EmbreeScene(), vertices, indices)
     moved = vertices + np.float32([0, 0, 3])
     TriangleMesh(theirs, moved, indices)

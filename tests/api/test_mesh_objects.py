@@ -172,6 +172,7 @@ POINTS = np.zeros((4, 3))
         (POINTS, TypeError, "faces must be given with vertices, got an array alone"),
         ([[0, 0, 0]], TypeError, "faces must be given with vertices, got an array alone"),
         ([[0, 0, 0], [1, 0, 0]], TypeError, "faces must be given with vertices, got an array alone"),
+        (np.zeros((5, 3, 3)), TypeError, r"got corners of triangles \(n, 3, 3\) alone: wive\.Scene\(corners"),
         ([(POINTS, FACES)] * 2, TypeError, r"a list of meshes: take wive\.Scene\.from_meshes\(meshes\)$"),
         ([(POINTS, FACES)], TypeError, r"a list of meshes: take wive\.Scene\.from_meshes\(meshes\)$"),
         ((wive.Scene(VERTICES, FACES), tensors(VERTICES, FACES)), TypeError, "got a list of meshes: take"),
@@ -209,7 +210,7 @@ def test_meshes_of_trimesh_are_taken_and_its_scenes_refused():
 
 
 def test_meshes_of_pyvista_are_taken():
-    pyvista = pytest.importorskip("pyvista")
+    pyvista = pytest.importorskip("pyvista", exc_type=ImportError)
     for dtype in (np.float32, np.float64):
         mesh = pyvista.PolyData(VERTICES.astype(dtype), padded(FACES))
         assert_same_scene(wive.Scene(mesh), wive.Scene(VERTICES.astype(dtype), FACES))
@@ -224,7 +225,7 @@ def test_meshes_of_pyvista_are_taken():
 
 
 def test_meshes_of_open3d_are_taken():
-    open3d = pytest.importorskip("open3d")
+    open3d = pytest.importorskip("open3d", exc_type=ImportError)
     mesh = open3d.geometry.TriangleMesh(
         open3d.utility.Vector3dVector(VERTICES.astype(float)), open3d.utility.Vector3iVector(FACES)
     )

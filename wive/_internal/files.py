@@ -8,6 +8,7 @@ from contextlib import contextmanager, suppress
 from typing import BinaryIO
 
 from wive._internal.lines import one_line
+from wive._internal.scalars import described
 
 PathLike = str | bytes | os.PathLike[str] | os.PathLike[bytes]
 
@@ -22,7 +23,7 @@ def file_name(path: PathLike) -> str:
     try:
         name = os.fsdecode(path)
     except TypeError:
-        raise TypeError(f"path must be a file name, got {type(path).__name__} {path!r:.60}") from None
+        raise TypeError(f"path must be a file name, got {described(path)}") from None
     if not name or "\0" in name:
         raise ValueError(f"path must be a file name, got {name!r:.60}")
     return name

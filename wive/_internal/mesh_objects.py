@@ -177,6 +177,11 @@ def _no_mesh(mesh: Any) -> str:
     if isinstance(mesh, tuple) and len(mesh) == 2:
         return "faces must be given with vertices, got a tuple of both: wive.Scene(*mesh)"
     if isinstance(mesh, (np.ndarray, list, tuple)) or library_of(mesh) is not NUMPY:
+        if getattr(mesh, "shape", ())[1:] == (3, 3):
+            return (
+                "faces must be given with vertices, got corners of triangles (n, 3, 3) alone: "
+                "wive.Scene(corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3))"
+            )
         return "faces must be given with vertices, got an array alone: wive.Scene(vertices, faces)"
     if is_placed(mesh):
         return f"the mesh must be one triangle mesh, got a {kind_of(mesh)}: take wive.Scene.from_meshes(mesh)"

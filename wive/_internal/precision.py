@@ -7,6 +7,7 @@ from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from wive import _cpu
 from wive._internal.room import expect_room
+from wive._internal.scalars import shown
 
 Precision = Literal["float32", "float64"]
 Floats = NDArray[np.float32 | np.float64]
@@ -79,7 +80,7 @@ def real_named(name: DTypeLike) -> Real:
                 return real
         except TypeError:
             break
-    raise ValueError(f"dtype must be float32 or float64, got {name!r:.60}")
+    raise ValueError(f"dtype must be float32 or float64, got {shown(name)}")
 
 
 def real_asked(name: DTypeLike, accuracy: str) -> Real:

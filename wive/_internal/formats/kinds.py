@@ -9,6 +9,7 @@ import re
 import zipfile
 
 from wive._internal.formats.text import COMMENT, MARKS
+from wive._internal.scalars import shown
 
 OBJ_LINE = re.compile(rb"^[ \t]*(?:v|f)[ \t]+[-+.\d]", re.MULTILINE)
 OFF_WORD = re.compile(rb"(?:ST)?C?N?4?n?OFF\b|OFF\d")
@@ -26,7 +27,7 @@ def kind_of(data: bytes, name: str, file_type: str | None) -> str:
     """The extension, without its dot, that stands for the format; ValueError if nothing tells it."""
     if file_type is not None:
         if not isinstance(file_type, str) or not file_type.strip(". "):
-            raise ValueError(f"file_type must be a format such as 'ply', got {file_type!r:.60}")
+            raise ValueError(f"file_type must be a format such as 'ply', got {shown(file_type)}")
         return file_type.strip().lower().rpartition(".")[2]
     stem, suffix = os.path.splitext(name)
     kind = suffix.lower().lstrip(".")
