@@ -19,6 +19,7 @@ template <class I>
 struct BoxHits;  // slabs.h
 template <class Float8>
 struct AllChildren;  // slabs.h
+struct OctantRows;   // slabs.h
 
 // Four numbers: one vector of x, y and z, or one value for each triangle of a block.
 template <class V, class Number>
@@ -179,6 +180,7 @@ concept StepCounter = requires(C counters, const C written, const TriangleBlock&
 template <class I, template <class> class Slabs, template <class> class Triangles, class Query>
 concept Traversable =
     Isa<I> && SlabTest<Slabs<I>, I> && std::constructible_from<Slabs<I>, const typename Triangles<I>::Frame&> &&
+    std::constructible_from<Slabs<I>, const typename Triangles<I>::Frame&, const OctantRows&> &&
     RayQuery<Query, typename I::Real> &&
     TriangleTest<Triangles<I>, typename Slabs<I>::Layout::template Corners<I>, Query>;
 

@@ -17,6 +17,19 @@
 
 namespace wive::WIVE_ISA {
 
+// The shift to an octant's bits in a lane of the order row, four bits per octant. Farthest child first, as the stack
+// needs: octant 7 - o is octant o in reverse.
+[[gnu::always_inline]] constexpr unsigned order_shift_of_octant(unsigned octant) { return 4 * (7 - octant); }
+[[gnu::always_inline]] constexpr unsigned octant_of_order_shift(unsigned shift) { return 7 - shift / 4; }
+
+// The rows of planes that rays of an octant meet first and last on an axis, in planes from the node's first.
+[[gnu::always_inline]] constexpr unsigned near_row_of(unsigned octant, unsigned axis) {
+    return node_width * (2 * axis + (octant >> axis & 1u));
+}
+[[gnu::always_inline]] constexpr unsigned far_row_of(unsigned octant, unsigned axis) {
+    return near_row_of(octant, axis) ^ node_width;
+}
+
 // The direction is divided by a power of two so that its longest component lies in [1, 2), whatever its length; t
 // scales with it, and both scalings are exact. Everything below is in these scaled units until a hit is written.
 //
@@ -61,11 +74,8 @@ struct RayFrame {
     alignas(16) float near_bias[4];
     alignas(16) float far_bias[4];
     Interval<Real> interval;
-    Real unscale;  // a power of two; t here = unscale * t of the caller's ray
-    // The rows of planes that the ray meets first and last on each axis, in planes from the node's first.
-    std::uint32_t near_row[3], far_row[3];
-    // The shift to the ray's octant in a lane of the order row, four bits per octant; farthest child first.
-    std::uint32_t order_shift;
+    Real unscale;                                        // a power of two; t here = unscale * t of the caller's ray
+    std::uint32_t near_row[3], far_row[3], order_shift;  // those of its octant
     unsigned longest_axis;
 
     static constexpr float slack_factor = 0x1p-20f;
@@ -106,12 +116,12 @@ struct RayFrame {
         const Float4 reciprocal = flip_sign(size, scaled);
         const Float4 distance = relative * reciprocal, slack = size * Float4::all(magnitude * slack_factor);
         const unsigned octant = sign_bits(scaled) & 7u;  // bit a: negative on axis a, from the sign of the reciprocal
-        order_shift = 4 * (7 - octant);  // farthest first, as the stack needs: octant 7 - o is octant o in reverse
+        order_shift = order_shift_of_octant(octant);
         longest_axis = static_cast<unsigned>(std::countr_zero(less_equal(Real4::all(longest), lengths)));
         assert(longest_axis < 3);
         for (unsigned axis = 0; axis < 3; ++axis) {
-            near_row[axis] = node_width * (2 * axis + (octant >> axis & 1u));
-            far_row[axis] = near_row[axis] ^ node_width;
+            near_row[axis] = near_row_of(octant, axis);
+            far_row[axis] = far_row_of(octant, axis);
         }
         caller_origin.store(origin);
         scaled_direction.store(direction);

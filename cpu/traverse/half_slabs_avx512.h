@@ -20,15 +20,17 @@ struct HalfSlabs {
     std::size_t near_row[3], far_row[3];  // in planes from the node's first
     unsigned order_shift;
 
-    WIVE_INLINE explicit HalfSlabs(const RayFrame<I>& ray)
+    WIVE_INLINE explicit HalfSlabs(const RayFrame<I>& ray) : HalfSlabs(ray, ray) {}
+    // octant: the ray's OctantRows, or a frame.
+    WIVE_INLINE HalfSlabs(const RayFrame<I>& ray, const auto& octant)
         : tmin_and_tmax(both(ray.interval.tmin, -ray.interval.tmax)) {
         for (unsigned axis = 0; axis < 3; ++axis) {
             rdir[axis] = both(ray.rdir[axis], -ray.rdir[axis]);
             bias[axis] = both(ray.near_bias[axis], -ray.far_bias[axis]);
-            near_row[axis] = ray.near_row[axis];
-            far_row[axis] = ray.far_row[axis];
+            near_row[axis] = octant.near_row[axis];
+            far_row[axis] = octant.far_row[axis];
         }
-        order_shift = ray.order_shift;
+        order_shift = octant.order_shift;
     }
 
     WIVE_INLINE typename I::Order order(const Node& node) const { return {node.order, order_shift}; }

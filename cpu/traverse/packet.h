@@ -208,7 +208,7 @@ private:
         // A leaf's box is in its parent, so each entry of the stack has its parent beside it, at the same index.
         const auto parent_at = [&](const Stack::Top& top) { return parents_ + (&top.distance() - stack_.distances); };
         walk<Query::in_order, I>(
-            bvh_, PacketSlabs<I, Layout>(bounds_), stack_, [&] { return box_tmax; },
+            bvh_, [&] { return PacketSlabs<I, Layout>(read_again(bounds_)); }, stack_, [&] { return box_tmax; },
             [&](std::uint32_t child, const Stack::Top& top) {
                 if (child != inner_child(0)) {
                     const int rays = __builtin_popcount(rays_meeting_box(*parent_at(top), child));

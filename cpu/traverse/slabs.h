@@ -34,6 +34,20 @@ struct OneChild {
     return reinterpret_cast<const float*>(&node) + plane;
 }
 
+// What the octant of a ray decides, as in its frame but computed from the shift alone. A ray that has just been loaded
+// starts sooner so: the compiler reads several rows of the frame at once, and such a load waits until the stores of
+// single rows have left the processor's store buffer.
+struct OctantRows {
+    std::uint32_t near_row[3], far_row[3], order_shift;
+
+    [[gnu::always_inline]] explicit OctantRows(unsigned shift) : order_shift(shift) {
+        for (unsigned axis = 0; axis < 3; ++axis) {
+            near_row[axis] = near_row_of(octant_of_order_shift(shift), axis);
+            far_row[axis] = far_row_of(octant_of_order_shift(shift), axis);
+        }
+    }
+};
+
 // Nodes with float32 planes, and blocks that store each triangle's corners.
 template <class Real>
 struct Float32Layout {
@@ -58,7 +72,7 @@ struct Float32Layout {
     }
 };
 
-// The shift to an octant's bits in a lane of the order row, from that of a frame, which counts four bits per octant.
+// The shift to an octant's bits in a lane of this layout's order row, from that of a frame.
 template <class Layout>
 [[gnu::always_inline]] constexpr unsigned order_shift_of(unsigned frame_shift) {
     assert(frame_shift % 4 == 0 && frame_shift / 4 < 8);  // one of eight octants
@@ -85,15 +99,18 @@ struct RaySlabs {
     std::size_t near_row[3], far_row[3];  // in planes from the node's first
     unsigned order_shift;
 
-    [[gnu::always_inline]] explicit RaySlabs(const RayFrame<I>& ray) : tmin(Float8::all(ray.interval.box_tmin())) {
+    [[gnu::always_inline]] explicit RaySlabs(const RayFrame<I>& ray) : RaySlabs(ray, ray) {}
+    // octant: the ray's OctantRows, or a frame.
+    [[gnu::always_inline]] RaySlabs(const RayFrame<I>& ray, const auto& octant)
+        : tmin(Float8::all(ray.interval.box_tmin())) {
         for (unsigned axis = 0; axis < 3; ++axis) {
             rdir[axis] = Float8::all(ray.rdir[axis]);
             near_bias[axis] = Float8::all(ray.near_bias[axis]);
             far_bias[axis] = Float8::all(ray.far_bias[axis]);
-            near_row[axis] = ray.near_row[axis];
-            far_row[axis] = ray.far_row[axis];
+            near_row[axis] = octant.near_row[axis];
+            far_row[axis] = octant.far_row[axis];
         }
-        order_shift = order_shift_of<Layout>(ray.order_shift);
+        order_shift = order_shift_of<Layout>(octant.order_shift);
     }
 
     [[gnu::always_inline]] typename I::Order order(const Node& node) const { return {node.order, order_shift}; }

@@ -42,10 +42,11 @@ template <bool in_order, Isa I, SlabTest<I> Slabs>
 // What a walk does next.
 enum class Walk { visit, skip, end };
 
-// Walks the tree from the root, for one ray or for a packet. box_tmax(): the distance up to which hits still count.
-// at_node(child, top) tells what to do at an inner node, at_leaf(child, top) at a leaf after testing it: visit goes on.
-template <bool in_order, Isa I, SlabTest<I> Slabs>
-[[gnu::always_inline]] inline void walk(const BvhView& bvh, const Slabs& slabs, Stack& stack, const auto& box_tmax,
+// Walks the tree from the root, for one ray or for a packet. make_slabs(): the slab test, made anew after each leaf.
+// box_tmax(): the distance up to which hits still count. at_node(child, top) tells what to do at an inner node,
+// at_leaf(child, top) at a leaf after testing it: visit goes on.
+template <bool in_order, Isa I>
+[[gnu::always_inline]] inline void walk(const BvhView& bvh, const auto& make_slabs, Stack& stack, const auto& box_tmax,
                                         const auto& at_node, const auto& at_leaf);
 
 // Traces one ray. result: in, the query before any hit; out, its result.
@@ -69,6 +70,12 @@ template <class Corners, class Triangles, class Query, StepCounter Counters>
 // Prefetches the first cache lines of a child: a whole node, or one block and more.
 template <class Layout>
 [[gnu::always_inline]] inline void prefetch(const BvhView& bvh, std::uint32_t child);
+
+// The same object, of whose values the compiler knows none: they are loaded where they are next needed. Nodes and
+// leaves need more registers than there are, so without this the compiler keeps what a node needs on the stack all the
+// time, because leaves use the registers, and loads it at each node.
+template <class T>
+[[gnu::always_inline]] inline const T& read_again(const T& object);
 
 // The query of ray i before any hit.
 template <class Query, Isa I>
@@ -119,9 +126,11 @@ template <bool in_order, Isa I, SlabTest<I> Slabs>
         return node.child[hit.last()];
 }
 
-template <bool in_order, Isa I, SlabTest<I> Slabs>
-[[gnu::always_inline]] inline void walk(const BvhView& bvh, const Slabs& slabs, Stack& stack, const auto& box_tmax,
+template <bool in_order, Isa I>
+[[gnu::always_inline]] inline void walk(const BvhView& bvh, const auto& make_slabs, Stack& stack, const auto& box_tmax,
                                         const auto& at_node, const auto& at_leaf) {
+    using Slabs = decltype(make_slabs());
+    static_assert(SlabTest<Slabs, I>);
     using Layout = typename Slabs::Layout;
     Stack::Top top(stack);
     std::uint32_t child = inner_child(0);  // the root
@@ -137,6 +146,7 @@ template <bool in_order, Isa I, SlabTest<I> Slabs>
             while (top.distance() > box_tmax()) pop();
     };
     for (;;) {
+        const Slabs slabs = make_slabs();
         while (is_inner(child)) {
             const Walk next = at_node(child, top);
             if (next == Walk::end) return;
@@ -161,9 +171,10 @@ template <Isa I, template <class> class Slabs, template <class> class Triangles,
     using Corners = typename Layout::template Corners<I>;
     assert(ray.is_finite());
     Query query = result;  // a local, so that it stays in registers
+    const OctantRows rows(ray.order_shift);
     Stack stack;
     walk<Query::in_order, I>(
-        bvh, Slabs<I>(ray), stack, [&] { return query.interval.box_tmax(); },
+        bvh, [&] { return Slabs<I>(read_again(ray), rows); }, stack, [&] { return query.interval.box_tmax(); },
         [&](std::uint32_t, const Stack::Top&) {
             counters.inner_node();
             return Walk::visit;
@@ -218,6 +229,13 @@ template <class Layout>
     const std::uintptr_t address = reinterpret_cast<std::uintptr_t>(bvh.units) + child_offset(child);
     for (unsigned line = 0; line < Layout::prefetched_lines; ++line)
         __builtin_prefetch(reinterpret_cast<const void*>(address + 64 * line));
+}
+
+template <class T>
+[[gnu::always_inline]] inline const T& read_again(const T& object) {
+    const T* pointer = &object;
+    asm volatile("" : "+r"(pointer));
+    return *pointer;
 }
 
 // Queries of several hits know which they take; AllHits alone records whose hits they are, in the caller's units.
