@@ -42,9 +42,9 @@ template <bool in_order, Isa I, SlabTest<I> Slabs>
 // What a walk does next.
 enum class Walk { visit, skip, end };
 
-// Walks the tree from the root, for one ray or for a packet. make_slabs(): the slab test, made anew after each leaf.
-// box_tmax(): the distance up to which hits still count. at_node(child, top) tells what to do at an inner node,
-// at_leaf(child, top) at a leaf after testing it: visit goes on.
+// Walks the tree from the root, for one ray or for a packet. make_slabs(): the slab test, made anew before the first
+// node after a leaf. box_tmax(): the distance up to which hits still count. at_node(child, top) tells what to do at an
+// inner node, at_leaf(child, top) at a leaf after testing it: visit goes on.
 template <bool in_order, Isa I>
 [[gnu::always_inline]] inline void walk(const BvhView& bvh, const auto& make_slabs, Stack& stack, const auto& box_tmax,
                                         const auto& at_node, const auto& at_leaf);
@@ -146,15 +146,17 @@ template <bool in_order, Isa I>
             while (top.distance() > box_tmax()) pop();
     };
     for (;;) {
-        const Slabs slabs = make_slabs();
-        while (is_inner(child)) {
-            const Walk next = at_node(child, top);
-            if (next == Walk::end) return;
-            if (next == Walk::visit)
-                child = visit_and_pop<in_order, I>(bvh, bvh.template node<Layout>(child), slabs, box_tmax(), top);
-            else
-                pop();
-            pop_hidden();
+        if (is_inner(child)) {
+            const Slabs slabs = make_slabs();
+            do {
+                const Walk next = at_node(child, top);
+                if (next == Walk::end) return;
+                if (next == Walk::visit)
+                    child = visit_and_pop<in_order, I>(bvh, bvh.template node<Layout>(child), slabs, box_tmax(), top);
+                else
+                    pop();
+                pop_hidden();
+            } while (is_inner(child));
         }
         if (child == end_of_stack || at_leaf(child, top) == Walk::end) return;
         pop();
