@@ -84,9 +84,12 @@ def rule_of(opcode: str) -> tuple[Rule, str]:
         return LOGICAL_NOT, kind
     if stem in RULES:
         return RULES[stem], kind
-    if stem == "mul.wide":
+    if stem in ("mul.wide", "mad.wide"):
         wide = WIDER[kind]
-        return Rule(f"{TYPES[wide]}({{a}}) * {TYPES[wide]}({{b}})", result=wide), kind
+        product = f"{TYPES[wide]}({{a}}) * {TYPES[wide]}({{b}})"
+        if stem == "mul.wide":
+            return Rule(product, result=wide), kind
+        return Rule(f"{product} + {{c}}", ("", "", wide), result=wide), kind
     if stem.startswith("setp.") and stem[5:] in COMPARISONS:
         return Rule(COMPARISONS[stem[5:]], result="pred"), kind
     conversion = _conversion(opcode)

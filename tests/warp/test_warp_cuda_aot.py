@@ -51,19 +51,19 @@ DOUBLE_BUILDS = [(query, 90, "watertight", "float32") for query in QUERIES] + [
 
 # Registers, measured with NVRTC and ptxas 13.5 and rounded up to a multiple of eight.
 REGISTERS = {
-    ("fast", 8): 96,
+    ("fast", 8): 80,
     ("watertight", 8): 88,
-    ("fast", 1): 72,
-    ("watertight", 1): 72,
+    ("fast", 1): 64,
+    ("watertight", 1): 64,
     ("exact", 8): 128,
     ("exact", 1): 128,
 }
 # Compressed nodes need a few more, for unpacking.
 COMPRESSED_REGISTERS = {
-    ("fast", 8): 96,
+    ("fast", 8): 80,
     ("watertight", 8): 88,
-    ("fast", 1): 72,
-    ("watertight", 1): 72,
+    ("fast", 1): 64,
+    ("watertight", 1): 64,
     ("exact", 8): 128,
     ("exact", 1): 128,
 }

@@ -16,6 +16,7 @@ from types import SimpleNamespace
 import warp as wp
 
 from wive.warp_kernels.lanes.native import (
+    BYTE_OF,
     DISTANCES_1,
     DISTANCES_8,
     DOUBLE_TRIANGLES_4,
@@ -24,6 +25,8 @@ from wive.warp_kernels.lanes.native import (
     ROUNDED_AS_WRITTEN,
     ROW_1,
     ROW_8,
+    STACK_1,
+    STACK_8,
     TRIANGLES_4,
     shared_stack_code,
 )
@@ -64,6 +67,37 @@ def load_float(units: wp.uint64, at: int) -> float:
 """)
 def load_double(units: wp.uint64, at: int) -> wp.float64:
     """The number stored in two words of the tree."""
+    ...
+
+
+@wp.func_native("""
+#if defined(__CUDA_ARCH__)
+    return __ldg((const float*)units + at + word);
+#else
+    return ((const float*)units)[at + word];
+#endif
+""")
+def load_float_behind(units: wp.uint64, at: int, word: int) -> float:
+    """The word that lies `word` words behind another: several behind one share the address of that."""
+    ...
+
+
+@wp.func_native("""
+    const double* number = (const double*)((const float*)units + at + word);
+#if defined(__CUDA_ARCH__)
+    return __ldg(number);
+#else
+    return *number;
+#endif
+""")
+def load_double_behind(units: wp.uint64, at: int, word: int) -> wp.float64:
+    """As `load_float_behind`, of two words."""
+    ...
+
+
+@wp.func_native(BYTE_OF)
+def byte_of(word: wp.uint32, i: int) -> int:
+    """The word's i-th byte from below."""
     ...
 
 
@@ -111,27 +145,31 @@ def lanes_of(length: int, stack_words: int, precision: str) -> SimpleNamespace:
     vector = wp.types.vector(length=length, dtype=wp.float32)
     words = wp.types.vector(length=length, dtype=wp.uint32)
     triangles = wp.types.vector(length=triangles_length, dtype=getattr(wp, precision))
-    stack_type = wp.types.vector(length=stack_words, dtype=wp.uint32)
+    # In 64 bits, which aligns the stack: words that are neighbours are then loaded together on CUDA.
+    stack_type = wp.types.vector(length=-(-stack_words // 2), dtype=wp.uint64)
+    stack_words_code = STACK_8 if eight else STACK_1
     stack_argument = wp.ref[stack_type] if eight else wp.uint64
 
     @wp.func_native(DISTANCES_8 if eight else DISTANCES_1)
-    def plane_distances(units: wp.uint64, at: int, lane: int, rdir: float, bias: float) -> vector: ...
+    def plane_distances(
+        units: wp.uint64, node: int, lane: int, row: int, rdir: float, bias: float
+    ) -> vector: ...
 
     @wp.func_native(ROW_8 if eight else ROW_1)
-    def load_row(units: wp.uint64, at: int, lane: int) -> words: ...
+    def load_row(units: wp.uint64, node: int, word: int, lane: int) -> words: ...
 
     if eight:
 
         @wp.func_native(TRIANGLES_4 if precision == "float32" else DOUBLE_TRIANGLES_4)
-        def load_triangles(units: wp.uint64, at: int, lane: int) -> triangles: ...
+        def load_triangles(units: wp.uint64, at: int, word: int, lane: int) -> triangles: ...
     else:
         # Native code here makes NVRTC peel the loop over a leaf's blocks: six registers more on sm_100.
         load_number = load_float if precision == "float32" else load_double
         number_words: int = 1 if precision == "float32" else 2
 
         @wp.func
-        def load_triangles(units: wp.uint64, at: int, lane: int):
-            return triangles(load_number(units, at + number_words * (lane & 3)))
+        def load_triangles(units: wp.uint64, at: int, word: int, lane: int):
+            return triangles(load_number(units, at + word + number_words * (lane & 3)))
 
     @wp.func_native(
         PRODUCTS.replace("LENGTH", str(triangles_length))
@@ -143,10 +181,10 @@ def lanes_of(length: int, stack_words: int, precision: str) -> SimpleNamespace:
     @wp.func_native(shared_stack_code(stack_words))
     def shared_stack() -> wp.uint64: ...
 
-    @wp.func_native("stack[at] = word;" if eight else "((unsigned*)stack)[at] = word;")
+    @wp.func_native(f"{stack_words_code}    words[at] = word;")
     def store_word(stack: stack_argument, at: int, word: wp.uint32): ...
 
-    @wp.func_native("return stack[at];" if eight else "return ((const unsigned*)stack)[at];")
+    @wp.func_native(f"{stack_words_code}    return words[at];")
     def load_word(stack: stack_argument, at: int) -> wp.uint32: ...
 
     return SimpleNamespace(

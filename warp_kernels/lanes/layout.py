@@ -19,14 +19,18 @@ CHILD_ROW = 6 * NODE_WIDTH
 BEHIND_ROW = 7 * NODE_WIDTH
 ORDER_BITS = 4  # per octant, in the core's order row
 
-# A compressed node: origin and step (three floats each), six rows of eight bytes, the order, the children.
-# `upload` turns the core's order into ranks: three bytes per lane with its place in each octant's order.
+# A compressed node: the grid's origin (three floats), a word with the exponents of its three steps and a
+# bit per slot in use, six rows of eight bytes, the order as above, the children. The core's has the steps
+# as floats and, behind the planes, an order row of three bytes per lane: `upload` rewrites nodes so that
+# all of it can be read 16 bytes at a time.
 COMPRESSED_NODE_WORDS = 32
-COMPRESSED_STEP = 3
-COMPRESSED_PLANES = 6
-COMPRESSED_RANKS = 18
+COMPRESSED_PLANES = 4
+COMPRESSED_BEHIND_ROW = 16
 COMPRESSED_CHILD_ROW = 24
-COMPRESSED_RANK_BITS = 3
+CORE_COMPRESSED_STEP = 3
+CORE_COMPRESSED_PLANES = 6
+CORE_COMPRESSED_ORDER = 18
+CORE_COMPRESSED_ORDER_BITS = 3
 
 # A block: nine rows of four numbers, row 3 k + axis for vertex k, and the prims; in float64 each number takes
 # two words, and the block is padded to a multiple of 32 bytes.
@@ -35,15 +39,24 @@ BLOCK_WORDS = 40
 PRIM_ROW = 9 * BLOCK_WIDTH
 MAX_LEAF_BLOCKS = 8
 
-# A compressed block: two words of header, rows x, y, z of its six or eight vertices, and the prims. The
-# header's words hold the corners' vertex numbers, 16 bits per corner, 4 bits per lane; above the third
-# corner's are a bit per lane in use and the number of vertices.
+# A compressed block: x, y and z of its six or eight vertices, and a fourth word behind each: the prims behind
+# vertices 0 to 3, the header's two words behind 4 and 5. These hold the corners' vertex numbers, 16 bits per
+# corner, 4 bits per lane; above the third corner's are a bit per lane in use and the number of vertices. The
+# core's has the header first, then rows of x, y and z, then the prims: `upload` rewrites it in place.
 LEAST_COMPRESSED_WORDS = 24
-HEADER_WORDS = 2
+VERTEX_WORDS = 4
+EXTRA_WORD = 3  # of a vertex
+HEADER_VERTEX = 4  # behind which the header begins
+CORE_HEADER_WORDS = 2
 CORNER_BITS = 16
 NUMBER_BITS = 4
 USED_SHIFT = 16
 VERTICES_SHIFT = 20
+
+# Zeros behind the tree on a device, as many as the largest leaf has words: a child that begins within the
+# tree can be read, whatever overwrote it.
+PADDING_WORDS = 2 * BLOCK_WORDS * MAX_LEAF_BLOCKS
+MOST_VERTICES = wp.constant(wp.uint32(15))  # of a compressed block that was overwritten
 
 END_OF_STACK = -1  # all bits set: a leaf by its sign
 NO_PRIM = -1

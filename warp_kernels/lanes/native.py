@@ -3,48 +3,85 @@
 Names that end in 8 or 4 are for lanes=8, one thread per ray; those in 1 for lanes=1, eight threads per ray.
 """
 
-from wive.warp_kernels.lanes.layout import COMPRESSED_PLANES, COMPRESSED_RANKS, COMPRESSED_STEP, NUMBER_BITS
 
+def load_16(kind: str, address: str, byte: int = 0) -> str:
+    """CUDA code that declares words[4] of `kind` and loads them from an address.
+
+    As __ldg, but compilers may merge equal loads, and `byte` is part of the instruction.
+    """
+    constraint = {"f32": "=f", "u32": "=r"}[kind]
+    type_name = {"f32": "float", "u32": "unsigned"}[kind]
+    outputs = ", ".join(f'"{constraint}"(words[{i}])' for i in range(4))
+    return f"""
+    {type_name} words[4];
+    asm("ld.global.nc.v4.{kind} {{%0, %1, %2, %3}}, [%4+{byte}];" : {outputs} : "l"({address}));
+"""
+
+
+# The address of a row that begins at a byte of a node, by one instruction on CUDA.
+ROW_ADDRESS = """
+    wp::uint64 address = (wp::uint64)((const float*)units + node);
+#if defined(__CUDA_ARCH__)
+    asm("mad.wide.u32 %0, %1, 1, %0;" : "+l"(address) : "r"(row));
+#else
+    address += row;
+#endif
+"""
 # Distances from the ray's origin to a row of planes: plane * rdir + bias, fused on CUDA, where a row is two
 # loads of 16 bytes.
-DISTANCES_8 = """
-    const float* row = (const float*)units + at;
+DISTANCES_8 = (
+    (
+        ROW_ADDRESS
+        + """
     wp::vec_t<8, wp::float32> distances;
 #if defined(__CUDA_ARCH__)
-    const float4 a = __ldg((const float4*)row), b = __ldg((const float4*)row + 1);
-    distances[0] = __fmaf_rn(a.x, rdir, bias); distances[1] = __fmaf_rn(a.y, rdir, bias);
-    distances[2] = __fmaf_rn(a.z, rdir, bias); distances[3] = __fmaf_rn(a.w, rdir, bias);
-    distances[4] = __fmaf_rn(b.x, rdir, bias); distances[5] = __fmaf_rn(b.y, rdir, bias);
-    distances[6] = __fmaf_rn(b.z, rdir, bias); distances[7] = __fmaf_rn(b.w, rdir, bias);
+    { LOW for (int i = 0; i < 4; ++i) distances[i] = __fmaf_rn(words[i], rdir, bias); }
+    { HIGH for (int i = 0; i < 4; ++i) distances[4 + i] = __fmaf_rn(words[i], rdir, bias); }
 #else
-    for (int i = 0; i < 8; ++i) distances[i] = row[i] * rdir + bias;
+    const float* planes = (const float*)address;
+    for (int i = 0; i < 8; ++i) distances[i] = planes[i] * rdir + bias;
 #endif
     return distances;
 """
-DISTANCES_1 = """
-    const float* row = (const float*)units + at + lane;
+    )
+    .replace("LOW", load_16("f32", "address"))
+    .replace("HIGH", load_16("f32", "address", 16))
+)
+DISTANCES_1 = (
+    ROW_ADDRESS
+    + """
+    const float* plane = (const float*)address + lane;
 #if defined(__CUDA_ARCH__)
-    return wp::vec_t<1, wp::float32>(__fmaf_rn(__ldg(row), rdir, bias));
+    return wp::vec_t<1, wp::float32>(__fmaf_rn(__ldg(plane), rdir, bias));
 #else
-    return wp::vec_t<1, wp::float32>(*row * rdir + bias);
+    return wp::vec_t<1, wp::float32>(*plane * rdir + bias);
+#endif
+"""
+)
+
+# A byte of a word, which CUDA takes out in one instruction.
+BYTE_OF = """
+#if defined(__CUDA_ARCH__)
+    return (int)__byte_perm(word, 0u, 0x4440u + i);
+#else
+    return (int)(word >> 8 * i & 255u);
 #endif
 """
 
-# A row of words, for children and ranks.
+# A row of words of a node, for its children.
 ROW_8 = """
-    const float* row = (const float*)units + at;
-    wp::vec_t<8, wp::uint32> words;
+    const wp::uint32* row = (const wp::uint32*)units + node;
+    wp::vec_t<8, wp::uint32> found;
 #if defined(__CUDA_ARCH__)
-    const uint4 a = __ldg((const uint4*)row), b = __ldg((const uint4*)row + 1);
-    words[0] = a.x; words[1] = a.y; words[2] = a.z; words[3] = a.w;
-    words[4] = b.x; words[5] = b.y; words[6] = b.z; words[7] = b.w;
+    { LOW for (int i = 0; i < 4; ++i) found[i] = words[i]; }
+    { HIGH for (int i = 0; i < 4; ++i) found[4 + i] = words[i]; }
 #else
-    for (int i = 0; i < 8; ++i) words[i] = ((const wp::uint32*)row)[i];
+    for (int i = 0; i < 8; ++i) found[i] = row[word + i];
 #endif
-    return words;
-"""
+    return found;
+""".replace("LOW", load_16("u32", "row + word")).replace("HIGH", load_16("u32", "row + word", 16))
 ROW_1 = """
-    const wp::uint32* row = (const wp::uint32*)units + at + lane;
+    const wp::uint32* row = (const wp::uint32*)units + node + word + lane;
 #if defined(__CUDA_ARCH__)
     return wp::vec_t<1, wp::uint32>(__ldg(row));
 #else
@@ -53,133 +90,33 @@ ROW_1 = """
 """
 
 # The slots behind each slot, as bytes: two words of one octant, or the byte of the lane's own slot.
-BEHIND_8 = """
-    const wp::uint32* row = (const wp::uint32*)units + at;
+BEHIND_8 = (
+    ROW_ADDRESS
+    + """
 #if defined(__CUDA_ARCH__)
-    const uint2 a = __ldg((const uint2*)row);
+    const uint2 a = __ldg((const uint2*)address);
     return wp::vec_t<2, wp::uint32>(a.x, a.y);
 #else
-    return wp::vec_t<2, wp::uint32>(row[0], row[1]);
+    const wp::uint32* words = (const wp::uint32*)address;
+    return wp::vec_t<2, wp::uint32>(words[0], words[1]);
 #endif
 """
-BEHIND_1 = """
-    const unsigned char* byte = (const unsigned char*)((const wp::uint32*)units + at) + lane;
+)
+BEHIND_1 = (
+    ROW_ADDRESS
+    + """
+    const unsigned char* byte = (const unsigned char*)address + lane;
 #if defined(__CUDA_ARCH__)
     return wp::vec_t<2, wp::uint32>(__ldg(byte), 0u);
 #else
     return wp::vec_t<2, wp::uint32>(*byte, 0u);
 #endif
 """
-
-_COMPRESSED_NODE = f"""
-    enum {{ STEP = {COMPRESSED_STEP}, PLANES = {COMPRESSED_PLANES}, RANKS = {COMPRESSED_RANKS} }};
-"""
-
-# Distances to a compressed row, whose planes are bytes on a grid:
-# byte * (step * rdir) + (origin * rdir + bias).
-BYTE_DISTANCES_8 = (
-    _COMPRESSED_NODE
-    + """
-    const float* words = (const float*)units + node;
-    wp::vec_t<8, wp::float32> distances;
-#if defined(__CUDA_ARCH__)
-    const float step = __fmul_rn(__ldg(words + STEP + axis), rdir);
-    const float base = __fmaf_rn(__ldg(words + axis), rdir, bias);
-    const uint2 bytes = __ldg((const uint2*)(words + PLANES) + row);
-    for (int i = 0; i < 4; ++i) {
-        distances[i] = __fmaf_rn((float)(bytes.x >> 8 * i & 255u), step, base);
-        distances[4 + i] = __fmaf_rn((float)(bytes.y >> 8 * i & 255u), step, base);
-    }
-#else
-    const float step = words[STEP + axis] * rdir, base = words[axis] * rdir + bias;
-    const unsigned char* bytes = (const unsigned char*)(words + PLANES) + 8 * row;
-    for (int i = 0; i < 8; ++i) distances[i] = (float)bytes[i] * step + base;
-#endif
-    return distances;
-"""
-)
-BYTE_DISTANCES_1 = (
-    _COMPRESSED_NODE
-    + """
-    const float* words = (const float*)units + node;
-    const unsigned char* byte = (const unsigned char*)(words + PLANES) + 8 * row + lane;
-#if defined(__CUDA_ARCH__)
-    const float base = __fmaf_rn(__ldg(words + axis), rdir, bias);
-    const float step = __fmul_rn(__ldg(words + STEP + axis), rdir);
-    return wp::vec_t<1, wp::float32>(__fmaf_rn((float)__ldg(byte), step, base));
-#else
-    return wp::vec_t<1, wp::float32>(
-        (float)*byte * (words[STEP + axis] * rdir) + (words[axis] * rdir + bias));
-#endif
-"""
-)
-
-# The ranks of a compressed node, three bytes per lane; the fourth byte of each word returned is undefined.
-RANKS_8 = (
-    _COMPRESSED_NODE
-    + """
-    const unsigned* row = (const unsigned*)units + node + RANKS;
-    wp::vec_t<8, wp::uint32> ranks;
-    for (int half = 0; half < 2; ++half) {
-#if defined(__CUDA_ARCH__)
-        const unsigned a = __ldg(row + 3 * half), b = __ldg(row + 3 * half + 1);
-        const unsigned c = __ldg(row + 3 * half + 2);
-#else
-        const unsigned a = row[3 * half], b = row[3 * half + 1], c = row[3 * half + 2];
-#endif
-        ranks[4 * half] = a;
-        ranks[4 * half + 1] = a >> 24 | b << 8;
-        ranks[4 * half + 2] = b >> 16 | c << 16;
-        ranks[4 * half + 3] = c >> 8;
-    }
-    return ranks;
-"""
-)
-RANKS_1 = (
-    _COMPRESSED_NODE
-    + """
-    const unsigned char* bytes = (const unsigned char*)((const unsigned*)units + node + RANKS) + 3 * lane;
-#if defined(__CUDA_ARCH__)
-    return wp::vec_t<1, wp::uint32>(__ldg(bytes) | __ldg(bytes + 1) << 8 | __ldg(bytes + 2) << 16);
-#else
-    return wp::vec_t<1, wp::uint32>(bytes[0] | bytes[1] << 8 | bytes[2] << 16);
-#endif
-"""
-)
-
-# One coordinate of four triangles' corners, or of the lane's own triangle, from a row of shared vertices;
-# `numbers` holds their places in the row.
-_NUMBERS = f"    enum {{ BITS = {NUMBER_BITS} }};"
-PICK_4 = (
-    _NUMBERS
-    + """
-    const float* from = (const float*)units + row;
-    wp::vec_t<4, wp::float32> picked;
-    for (int i = 0; i < 4; ++i) {
-#if defined(__CUDA_ARCH__)
-        picked[i] = __ldg(from + (numbers >> BITS * i & 7u));
-#else
-        picked[i] = from[numbers >> BITS * i & 7u];
-#endif
-    }
-    return picked;
-"""
-)
-PICK_1 = (
-    _NUMBERS
-    + """
-    const float* from = (const float*)units + row + (numbers >> BITS * (lane & 3) & 7u);
-#if defined(__CUDA_ARCH__)
-    return wp::vec_t<1, wp::float32>(__ldg(from));
-#else
-    return wp::vec_t<1, wp::float32>(*from);
-#endif
-"""
 )
 
 # A row of a block: the numbers of its four triangles, or that of the lane's own triangle.
 TRIANGLES_4 = """
-    const float* row = (const float*)units + at;
+    const float* row = (const float*)units + at + word;
 #if defined(__CUDA_ARCH__)
     const float4 a = __ldg((const float4*)row);
     return wp::vec_t<4, wp::float32>(a.x, a.y, a.z, a.w);
@@ -188,7 +125,7 @@ TRIANGLES_4 = """
 #endif
 """
 DOUBLE_TRIANGLES_4 = """
-    const double* row = (const double*)((const float*)units + at);
+    const double* row = (const double*)((const float*)units + at + word);
 #if defined(__CUDA_ARCH__)
     const double2 a = __ldg((const double2*)row), b = __ldg((const double2*)row + 1);
     return wp::vec_t<4, wp::float64>(a.x, a.y, b.x, b.y);
@@ -268,6 +205,14 @@ _ELEMENT = """
 """
 READ_ELEMENT = _ELEMENT + "    return *element;"
 WRITE_ELEMENT = _ELEMENT + "    *element = value;"
+
+
+# A stack as an array of words: a thread's own, or the address of a group's.
+STACK_8 = """
+    typedef unsigned __attribute__((may_alias)) word_of_stack;
+    word_of_stack* const words = (word_of_stack*)&stack;
+"""
+STACK_1 = "    unsigned* const words = (unsigned*)stack;\n"
 
 
 def shared_stack_code(words: int) -> str:

@@ -106,11 +106,11 @@ WARP_LANE = """
     return thread % WIDTH;
 #endif
 """
-WARP_RAYS = """
+WARP_WIDTH = """
 #if defined(__CUDA_ARCH__)
-    return 32 / THREADS;
+    return 32;
 #else
-    return 1;
+    return WIDTH;
 #endif
 """
 
@@ -199,7 +199,7 @@ def warp_of(length: int) -> SimpleNamespace:
     """The threads that loop together: a warp on CUDA, the threads of one ray on the CPU device.
 
     vote: one bit per lane whose value is not zero. index, lane: of a thread, by its number in the launch.
-    rays: how many rays a warp traces at once.
+    width: the threads of a whole warp; rays: how many rays it traces at once.
     """
     threads = 8 // expected_lanes(length)
 
@@ -209,8 +209,12 @@ def warp_of(length: int) -> SimpleNamespace:
     @wp.func_native(WARP_LANE.replace("WIDTH", str(threads)))
     def lane(thread: int) -> int: ...
 
-    @wp.func_native(WARP_RAYS.replace("THREADS", str(threads)))
-    def rays() -> int: ...
+    @wp.func_native(WARP_WIDTH.replace("WIDTH", str(threads)))
+    def width() -> int: ...
+
+    @wp.func
+    def rays():
+        return width() // threads
 
     vote = _vote_8 if threads == 1 else _vote_1
-    return SimpleNamespace(vote=vote, index=index, lane=lane, rays=rays, threads=threads)
+    return SimpleNamespace(vote=vote, index=index, lane=lane, width=width, rays=rays, threads=threads)

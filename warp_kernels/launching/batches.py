@@ -41,7 +41,8 @@ def make_loop(
     keep, check, step = steps.keep, steps.check, steps.step
     settled, unscale, new_stack, sync = steps.settled, steps.unscale, steps.new_stack, steps.sync
     warp = warp_of(length)
-    vote, warp_index, warp_lane, warp_rays = warp.vote, warp.index, warp.lane, warp.rays
+    vote, warp_index, warp_lane = warp.vote, warp.index, warp.lane
+    warp_rays, warp_width = warp.rays, warp.width
     threads: int = warp.threads
     start = make_start(query, accuracy, precision)
     found_before, wanted = start.found, start.wanted
@@ -95,11 +96,11 @@ def make_loop(
         # One answer for the warp, whose threads may see the flag change at different times.
         sound = vote(wp.uint32(tree.error[CORRUPTION])) == wp.uint32(0)
         while share.going != 0:
-            busy = vote_on(walk.child != END_OF_STACK)
-            idle = vote_on(walk.child == END_OF_STACK)
-            waiting = wp.int32(wp.bit_count(idle))
-            if busy == wp.uint32(0) or (share.next_ray < end and waiting >= IDLE_LANES):
+            at_leaves = wp.int32(wp.bit_count(vote_on(walk.child < END_OF_STACK)))
+            at_nodes = wp.int32(wp.bit_count(vote_on(walk.child > END_OF_STACK)))
+            if at_leaves + at_nodes <= wp.where(share.next_ray < end, warp_width() - IDLE_LANES, 0):
                 ends = walk.child == END_OF_STACK
+                idle = vote_on(ends)
                 last = settled(units, lane, stack, walk)
                 settle(out, share.number, lane, unscale(stack), last, ends and share.number >= 0)
                 sync()  # the old ray's numbers have been read
@@ -122,11 +123,9 @@ def make_loop(
                             walk.child = 0
                 share.next_ray += wp.min(rays_in(idle), left)
                 sync()
-            at_leaf = walk.child < END_OF_STACK
-            at_node = walk.child > END_OF_STACK
-            leaves = wp.bit_count(vote_on(at_leaf)) > wp.bit_count(vote_on(at_node))
-            goes = wp.where(leaves, at_leaf, at_node)
-            walk = check(tree, walk, goes)
-            walk = step(units, lane, stack, walk, goes and walk.child != END_OF_STACK, leaves)
+            else:
+                leaves = at_leaves > at_nodes
+                walk = check(tree, walk, leaves)
+                walk = step(units, lane, stack, walk, leaves)
 
     return trace_share

@@ -106,12 +106,12 @@ def make_closest_point(accuracy: str, stack_size: int, nodes: str, precision: st
     node_words: int = node.words
     block_words: int = blocks.least_words
     child_row: int = node.child_row
-    distances, has_child = node.distances, node.has_child
+    grid_of, distances, low_row, used = node.grid, node.distances, node.low_row, node.used
     load_row, store_word, load_word = lanes.load_row, lanes.store_word, lanes.load_word
     vector: Any = lanes.vector
     new_stack, stack_argument = lanes.new_stack, lanes.stack_argument
-    vertex_at, stride, edge_at, prim_at, block_at = (
-        blocks.vertex_at, blocks.stride, blocks.edge_at, blocks.prim_at, blocks.block_at
+    vertex_at, stride, edge_of, prim_at, block_at = (
+        blocks.vertex_at, blocks.stride, blocks.edge_of, blocks.prim_at, blocks.block_at
     )  # fmt: skip
     largest: Any = real(MAX_COORDINATE)
     margin, least = wp.float64(MARGIN[precision]), wp.float64(LEAST[precision])
@@ -129,7 +129,9 @@ def make_closest_point(accuracy: str, stack_size: int, nodes: str, precision: st
                     v0 = load_number(units, first + axis * step)
                     corners[k, axis] = wp.float64(v0)
                     if k > 0:
-                        corners[k, axis] = wp.float64(v0) + wp.float64(edge_at(units, at + axis * step, v0))
+                        corners[k, axis] = wp.float64(v0) + wp.float64(
+                            edge_of(load_number(units, at + axis * step), v0)
+                        )
                 else:
                     corners[k, axis] = wp.float64(load_number(units, at + axis * step))
         return corners
@@ -140,11 +142,14 @@ def make_closest_point(accuracy: str, stack_size: int, nodes: str, precision: st
         units: wp.uint64, begin: int, frame: PointFrame, limit: float, stack: stack_argument, top: int
     ) -> int:
         """Store at `top` the children that are near enough, the nearest last; return their number."""
-        children = load_row(units, begin + child_row, 0)
+        children = load_row(units, begin, child_row, 0)
+        grid = grid_of(units, begin)
+        slots = used(grid)
         squared = vector(0.0)
         for axis in range(3):
-            low = distances(units, begin, 0, axis, 2 * axis, frame.scale, frame.low_bias[axis])
-            high = distances(units, begin, 0, axis, 2 * axis + 1, -frame.scale, frame.high_bias[axis])
+            scales = wp.vec2(frame.scale, -frame.scale)
+            biases = wp.vec2(frame.low_bias[axis], frame.high_bias[axis])
+            low, high = distances(units, begin, grid, 0, axis, low_row(axis), scales, biases)
             for i in range(8):
                 gap = wp.max(wp.max(low[i], high[i]), -frame.beyond[axis])
                 squared[i] = squared[i] + gap * (gap + 2.0 * frame.beyond[axis])
@@ -152,7 +157,7 @@ def make_closest_point(accuracy: str, stack_size: int, nodes: str, precision: st
         nearest = int(0)
         least_squared = float(wp.inf)
         for i in range(8):
-            if squared[i] <= limit and has_child(children[i]):
+            if squared[i] <= limit and (slots >> wp.uint32(i)) & wp.uint32(1) != wp.uint32(0):
                 store_word(stack, top + count, children[i])
                 store_word(stack, stack_size + top + count, wp.cast(squared[i], wp.uint32))
                 if squared[i] < least_squared:

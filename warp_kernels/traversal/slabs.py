@@ -4,25 +4,26 @@ from types import SimpleNamespace
 
 import warp as wp
 
-from wive.warp_kernels.lanes.lanes import without_gradient
+from wive.warp_kernels.lanes.lanes import byte_of, without_gradient
 from wive.warp_kernels.lanes.precision import stack_numbers
 from wive.warp_kernels.queries.frame import box_tmin
 
 # What visits read of a ray, in words: one over its direction, the biases of near and far planes (three each),
-# tmin, and the octant. They are kept in the stack's memory, because a traversal has few registers to spare
-# between visits.
+# tmin, and where its rows begin in nodes. They are kept in the stack's memory, because a traversal has few
+# registers to spare between visits.
 RDIR = 0
 NEAR_BIAS = 3
 FAR_BIAS = 6
 BOX_TMIN = 9
-OCTANT = 10
+ROWS = 10
 BOX_WORDS = 11
 
 
-def make_keep(lanes: SimpleNamespace, box_base: int, frame_type: type) -> wp.Function:
+def make_keep(lanes: SimpleNamespace, nodes: SimpleNamespace, box_base: int, frame_type: type) -> wp.Function:
     """The function that keeps what visits need of a ray, from stack word `box_base` on."""
     numbers = stack_numbers(lanes, "float32", box_base)
     store, store_word, stack_argument = numbers.store, lanes.store_word, lanes.stack_argument
+    rows_of = nodes.rows_of
 
     @without_gradient
     @wp.func
@@ -32,7 +33,7 @@ def make_keep(lanes: SimpleNamespace, box_base: int, frame_type: type) -> wp.Fun
             store(stack, NEAR_BIAS + axis, ray.near_bias[axis])
             store(stack, FAR_BIAS + axis, ray.far_bias[axis])
         store(stack, BOX_TMIN, box_tmin(ray))
-        store_word(stack, box_base + OCTANT, wp.uint32(ray.octant))
+        store_word(stack, box_base + ROWS, rows_of(ray.octant))
 
     return keep
 
@@ -50,27 +51,41 @@ def make_visit(
     load, load_vector, load_word = numbers.load, numbers.load_vector, lanes.load_word
     length = lanes.length
     vector, words = lanes.vector, lanes.words
-    distances, order_of, has_child = nodes.distances, nodes.order, nodes.has_child
-    bit, before, order_type = nodes.bit, nodes.before, nodes.order_type
+    grid_of, distances, used = nodes.grid, nodes.distances, nodes.used
+    order_of, places, place = nodes.order, nodes.places, nodes.place
     child_row: int = nodes.child_row
-    load_row = lanes.load_row
-    collect = lanes.group_vote if nodes.bits_are_slots or not in_order else lanes.or_reduce
-    stack_argument = lanes.stack_argument
-    store_word = lanes.store_word
+    load_row, collect = lanes.load_row, lanes.group_vote
+    stack_argument, store_word = lanes.stack_argument, lanes.store_word
+    alone: bool = lanes.length == 8
 
     @wp.func
-    def bit_of(order: order_type, i: int, slot: int):
-        """A child in the mask of hits."""
-        if wp.static(in_order):
-            return bit(order, i, slot)
-        return wp.uint32(1) << wp.uint32(slot)
+    def slots_below(lane: int):
+        """An order in which each slot goes above the lower ones."""
+        if wp.static(alone):
+            return wp.vec3ui(wp.uint32(0x07030100), wp.uint32(0x7F3F1F0F), wp.uint32(0))
+        return wp.vec3ui((wp.uint32(1) << wp.uint32(lane)) - wp.uint32(1), wp.uint32(0), wp.uint32(0))
 
+    @without_gradient
     @wp.func
-    def place_of(order: order_type, i: int, slot: int, hits: wp.uint32):
-        """How many hits a child goes above: the farther ones, or those of lower slots."""
-        if wp.static(in_order):
-            return before(order, i, slot, hits)
-        return wp.int32(wp.bit_count(hits & ((wp.uint32(1) << wp.uint32(slot)) - wp.uint32(1))))
+    def push(
+        own: wp.uint32,
+        hits: wp.uint32,
+        order: wp.vec3ui,
+        children: words,
+        tnear: vector,
+        lane: int,
+        stack: stack_argument,
+        top: int,
+    ):
+        """(D) store: a hit goes above those that are farther."""
+        stored = places(order, hits, top)
+        for i in range(length):
+            if (own & (wp.uint32(1) << wp.uint32(lane + i))) != wp.uint32(0):
+                at = place(order, stored, i, hits)
+                store_word(stack, at, children[i])
+                if wp.static(in_order):
+                    store_word(stack, stack_size + at, wp.cast(tnear[i], wp.uint32))
+        return wp.int32(wp.bit_count(hits))
 
     @without_gradient
     @wp.func
@@ -87,43 +102,44 @@ def make_visit(
 
         All threads of a warp call it; those that do not go have no children.
         """
-        order = order_type()
+        order = wp.vec3ui()
         children = words()
         tnear = vector()
         own = wp.uint32(0)
+        count = int(0)
         if goes:
-            # (A) order: octant 7 - o is octant o backwards, and the stack needs the farthest child first.
-            octant = int(load_word(stack, box_base + OCTANT))
+            # (A) order: the stack needs the farthest child first.
+            rows = load_word(stack, box_base + ROWS)
+            order = slots_below(lane)
             if wp.static(in_order):
-                order = order_of(units, node, lane, octant)
-            children = load_row(units, node + child_row, lane)
-            # (B) slabs: rows are lo.x hi.x lo.y hi.y lo.z hi.z; the ray's sign picks the near one of a pair.
-            x = octant & 1
-            y = (octant >> 1) & 1
-            z = octant >> 2
+                order = order_of(units, node, lane, rows)
+            children = load_row(units, node, child_row, lane)
+            # (B) slabs: the ray's octant says which row of an axis has its near planes.
+            grid = grid_of(units, node)
             r = load_vector(stack, RDIR)
-            b = load_vector(stack, NEAR_BIAS)
-            near_x = distances(units, node, lane, 0, x, r[0], b[0])
-            near_y = distances(units, node, lane, 1, 2 + y, r[1], b[1])
-            near_z = distances(units, node, lane, 2, 4 + z, r[2], b[2])
-            b = load_vector(stack, FAR_BIAS)
-            far_x = distances(units, node, lane, 0, 1 - x, r[0], b[0])
-            far_y = distances(units, node, lane, 1, 3 - y, r[1], b[1])
-            far_z = distances(units, node, lane, 2, 5 - z, r[2], b[2])
+            near = load_vector(stack, NEAR_BIAS)
+            far = load_vector(stack, FAR_BIAS)
+            near_x, far_x = distances(
+                units, node, grid, lane, 0, byte_of(rows, 0), wp.vec2(r[0], r[0]), wp.vec2(near[0], far[0])
+            )
+            near_y, far_y = distances(
+                units, node, grid, lane, 1, byte_of(rows, 1), wp.vec2(r[1], r[1]), wp.vec2(near[1], far[1])
+            )
+            near_z, far_z = distances(
+                units, node, grid, lane, 2, byte_of(rows, 2), wp.vec2(r[2], r[2]), wp.vec2(near[2], far[2])
+            )
             tnear = wp.max(wp.max(near_x, near_y), wp.max(near_z, vector(load(stack, BOX_TMIN))))
             tfar = wp.min(wp.min(far_x, far_y), wp.min(far_z, vector(tmax)))
             # (C) compress: a bit for each child hit.
             for i in range(length):
-                met = tnear[i] <= tfar[i] and has_child(children[i])
-                own = own | wp.where(met, bit_of(order, i, lane + i), wp.uint32(0))
-        hits = collect(own)
-        # (D) store: a hit goes above those that are farther.
-        for i in range(length):
-            if (own & bit_of(order, i, lane + i)) != wp.uint32(0):
-                at = top + place_of(order, i, lane + i, hits)
-                store_word(stack, at, children[i])
-                if wp.static(in_order):
-                    store_word(stack, stack_size + at, wp.cast(tnear[i], wp.uint32))
-        return wp.int32(wp.bit_count(hits))
+                met = tnear[i] <= tfar[i]
+                own = own | wp.where(met, wp.uint32(1) << wp.uint32(lane + i), wp.uint32(0))
+            own = own & used(grid)
+            if wp.static(alone):
+                count = push(own, own, order, children, tnear, lane, stack, top)
+        if wp.static(not alone):
+            hits = collect(own)
+            count = push(own, hits, order, children, tnear, lane, stack, top)
+        return count
 
     return visit

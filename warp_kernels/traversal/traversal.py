@@ -60,8 +60,8 @@ def make_steps(
     """The steps of a traversal, for a query, accuracy, lane form, stack size, node form and precision.
 
     keep(ray, stack) comes first, and check(...) before each step(...), which all threads of a warp take
-    together, to leaves or to inner nodes; those that do not `go` keep their traversal as it is. settled(...)
-    is what a thread has found at the end.
+    together, to leaves or to inner nodes; those that are at the other or at their end keep their traversal as
+    it is. settled(...) is what a thread has found at the end.
 
     The stack, a new_stack(), holds `stack_size` children, behind them their distances if the query is in
     order, and behind these what triangle tests, visits and queries need of the ray.
@@ -71,13 +71,14 @@ def make_steps(
     first_hit_ends: bool = query_type.first_hit_ends
     make_triangles, ray_words = TRIANGLES[accuracy, precision]
     ray_base = stack_size * (2 if in_order else 1)
-    box_base = ray_base + ray_words
-    own_base = box_base + BOX_WORDS
+    # Both begin at even words: neighbours in a pair are stored and loaded together on CUDA.
+    box_base = ray_base + ray_words + ray_words % 2
+    own_base = box_base + BOX_WORDS + BOX_WORDS % 2
     lanes = lanes_of(length, own_base + 2 * PRECISIONS[precision].words, precision)
     blocks, node = block_form(lanes, nodes, precision), NODES[nodes](lanes)
     triangles = make_triangles(lanes, blocks, ray_base, precision, query_type.crossings)
     frame_type = FRAMES[precision]
-    keep_box = make_keep(lanes, box_base, frame_type)
+    keep_box = make_keep(lanes, node, box_base, frame_type)
     visit = make_visit(lanes, node, stack_size, box_base, in_order)
     numbers = stack_numbers(lanes, precision, own_base)
     store, load = numbers.store, numbers.load
@@ -85,8 +86,6 @@ def make_steps(
     offer = (make_exact_offer if accuracy == "exact" else make_offer)(query_type, lanes, triangles, real)
     test_leaf = make_leaf_test(query_type, lanes, blocks, triangles.candidates, offer, real)
     count_triangles = make_count(blocks)
-    node_words: int = node.words
-    block_words: int = blocks.least_words
     tree_type, found_type = HANDLES[accuracy, precision], query_type.state
     walk_type = TRAVERSALS[found_type]
     # Hits of a ray's threads whose t round to the same float32 number are compared once more at the end.
@@ -122,20 +121,25 @@ def make_steps(
         walk.top = 1
         return walk
 
+    @wp.func
+    def goes_on(child: int, to_leaf: bool):
+        """Whether a traversal at this child takes a step to leaves, or to inner nodes."""
+        leaf_or_node = wp.where(to_leaf, END_OF_STACK - child, child - END_OF_STACK)
+        return leaf_or_node > 0
+
     @without_gradient
     @wp.func
-    def check(tree: tree_type, walk: walk_type, goes: bool) -> walk_type:
+    def check(tree: tree_type, walk: walk_type, to_leaf: bool) -> walk_type:
         """End the traversal, with an error, if it goes on but can't take its next step."""
-        begin = walk.child & WORD_MASK
-        size = wp.where(walk.child >= 0, node_words, ((walk.child & 7) + 1) * block_words)
-        walk.steps += wp.where(goes, 1, 0)
-        if goes and (
-            walk.steps > tree.step_limit
-            or walk.top > wp.static(stack_size - NODE_WIDTH)
-            or wp.uint32(begin) + wp.uint32(size) > wp.uint32(tree.units.shape[0])
-        ):
-            tree.error[CORRUPTION] = 1
-            walk.child = END_OF_STACK
+        if goes_on(walk.child, to_leaf):
+            walk.steps += 1
+            if (
+                walk.steps > tree.step_limit
+                or walk.top > wp.static(stack_size - NODE_WIDTH)
+                or (walk.child & WORD_MASK) >= tree.units.shape[0]
+            ):
+                tree.error[CORRUPTION] = 1
+                walk.child = END_OF_STACK
         return walk
 
     # Structs are changed field by field: one that is assigned as a whole under a condition takes its
@@ -143,12 +147,11 @@ def make_steps(
 
     @without_gradient
     @wp.func
-    def step(
-        units: wp.uint64, lane: int, stack: stack_argument, walk: walk_type, goes: bool, at_leaf: bool
-    ) -> walk_type:
+    def step(units: wp.uint64, lane: int, stack: stack_argument, walk: walk_type, to_leaf: bool) -> walk_type:
         """Test the triangles of a leaf or visit an inner node, and take the next child from the stack."""
         begin = walk.child & WORD_MASK
-        if at_leaf:
+        goes = goes_on(walk.child, to_leaf)
+        if to_leaf:
             block_count = (walk.child & 7) + 1
             last = wp.uint32(0)
             if goes:
@@ -235,8 +238,9 @@ def make_traversal(
         keep(ray, stack)
         walk = begin(ray, found)
         while walk.child != END_OF_STACK:
-            walk = check(tree, walk, True)
-            walk = step(units, 0, stack, walk, walk.child != END_OF_STACK, walk.child < 0)
+            to_leaf = walk.child < 0
+            walk = check(tree, walk, to_leaf)
+            walk = step(units, 0, stack, walk, to_leaf)
         return walk
 
     return traverse

@@ -1,128 +1,180 @@
 """The two node forms (layout.h, compressed.h): what a visit reads of a node, for either lane form.
 
-Both give the order of children alike: order(units, node, lane, octant) is what a visit needs of it, bit(...)
-stands for a slot in a mask of hits, and before(...) is the number of hits that are farther than that slot's.
+rows_of(octant) says where in a node the rows begin that rays of an octant need: a byte per axis for the near
+planes, and one for the order. grid(...) is what planes are relative to, and distances(...) are those to the
+near and to the far planes of an axis, along the ray from its origin: plane * rdir + bias.
+
+order(...) is what a visit needs of the children's order; places(...) and place(...) are where on the stack a
+slot's child goes among the hits. used(grid) has a bit for each slot that has a child.
 """
 
 from types import SimpleNamespace
+from typing import Any
 
 import warp as wp
 
+from wive.warp_kernels.lanes.compressed_native import BYTE_DISTANCES_1, BYTE_DISTANCES_8, GRID
+from wive.warp_kernels.lanes.lanes import byte_of
 from wive.warp_kernels.lanes.layout import (
     ALL_BITS,
     BEHIND_ROW,
     CHILD_ROW,
+    COMPRESSED_BEHIND_ROW,
     COMPRESSED_CHILD_ROW,
     COMPRESSED_NODE_WORDS,
-    COMPRESSED_RANK_BITS,
+    COMPRESSED_PLANES,
     NODE_WIDTH,
     NODE_WORDS,
 )
-from wive.warp_kernels.lanes.native import (
-    BEHIND_1,
-    BEHIND_8,
-    BYTE_DISTANCES_1,
-    BYTE_DISTANCES_8,
-    RANKS_1,
-    RANKS_8,
-)
+from wive.warp_kernels.lanes.native import BEHIND_1, BEHIND_8
 
-
-@wp.func
-def _always(child: wp.uint32):
-    return True
-
-
-@wp.func
-def _has_child(child: wp.uint32):
-    return child != ALL_BITS
+ORDER_BYTE = 3  # of rows_of
+FLOAT_ROW_BYTES, BYTE_ROW_BYTES = 4 * NODE_WIDTH, NODE_WIDTH
 
 
 def float32_node(lanes: SimpleNamespace) -> SimpleNamespace:
     """Rows of floats; empty lanes hold boxes that nothing hits."""
     plane_distances = lanes.plane_distances
-    eight: bool = lanes.length == 8
 
     @wp.func
-    def distances(units: wp.uint64, node: int, lane: int, axis: int, row: int, rdir: float, bias: float):
-        """Distances along the ray from its origin to a row of planes."""
-        return plane_distances(units, node + NODE_WIDTH * row, lane, rdir, bias)
-
-    @wp.func_native(BEHIND_8 if eight else BEHIND_1)
-    def load_behind(units: wp.uint64, at: int, lane: int) -> wp.vec2ui: ...
+    def grid(units: wp.uint64, node: int):
+        return wp.vec4()
 
     @wp.func
-    def order(units: wp.uint64, node: int, lane: int, octant: int):
-        """The slots behind each slot; those before it and itself, if the octant is one of the last four."""
-        backwards = octant > 3
-        behind = load_behind(units, node + BEHIND_ROW + 2 * wp.where(backwards, 7 - octant, octant), lane)
-        flip = wp.where(backwards, ALL_BITS, wp.uint32(0))
-        return wp.vec3ui(behind[0] ^ flip, behind[1] ^ flip, flip)
+    def distances(
+        units: wp.uint64,
+        node: int,
+        grid: wp.vec4,
+        lane: int,
+        axis: int,
+        near_row: int,
+        rdir: wp.vec2,
+        bias: wp.vec2,
+    ):
+        far_row = near_row ^ FLOAT_ROW_BYTES
+        near = plane_distances(units, node, lane, near_row, rdir[0], bias[0])
+        return near, plane_distances(units, node, lane, far_row, rdir[1], bias[1])
 
     @wp.func
-    def bit(order: wp.vec3ui, i: int, slot: int):
-        return wp.uint32(1) << wp.uint32(slot)
-
-    @wp.func
-    def before(order: wp.vec3ui, i: int, slot: int, hits: wp.uint32):
-        behind = (order[i // 4] >> wp.uint32(8 * (i % 4))) & hits
-        return wp.int32(wp.bit_count(behind)) + wp.int32(order[2])
+    def used(grid: wp.vec4):
+        return ALL_BITS
 
     return SimpleNamespace(
         words=NODE_WORDS,
-        distances=distances,
-        order=order,
-        order_type=wp.vec3ui,
-        bits_are_slots=True,
-        bit=bit,
-        before=before,
         child_row=CHILD_ROW,
-        has_child=_always,
+        grid=grid,
+        distances=distances,
+        used=used,
+        **_places(lanes, first_plane=0, row_bytes=FLOAT_ROW_BYTES, order_byte=4 * BEHIND_ROW),
     )
 
 
 def compressed_node(lanes: SimpleNamespace) -> SimpleNamespace:
     """Rows of bytes on a grid given by an origin and three steps; empty lanes have no child."""
-    vector, words = lanes.vector, lanes.words
     length: int = lanes.length
-    eight: bool = lanes.length == 8
+    vector: Any = lanes.vector
+    both_vectors = wp.types.vector(length=2 * length, dtype=wp.float32)
 
-    @wp.func_native(BYTE_DISTANCES_8 if eight else BYTE_DISTANCES_1)
+    @wp.func_native(GRID)
+    def grid(units: wp.uint64, node: int) -> wp.vec4: ...
+
+    @wp.func_native(BYTE_DISTANCES_8 if length == 8 else BYTE_DISTANCES_1)
+    def byte_distances(
+        units: wp.uint64,
+        node: int,
+        grid: wp.vec4,
+        lane: int,
+        axis: int,
+        near_row: int,
+        rdir: wp.vec2,
+        bias: wp.vec2,
+    ) -> both_vectors: ...
+
+    @wp.func
     def distances(
-        units: wp.uint64, node: int, lane: int, axis: int, row: int, rdir: float, bias: float
-    ) -> vector: ...
-
-    @wp.func_native(RANKS_8 if eight else RANKS_1)
-    def load_ranks(units: wp.uint64, node: int, lane: int) -> words: ...
-
-    @wp.func
-    def order(units: wp.uint64, node: int, lane: int, octant: int):
-        """The farthest child gets the lowest place."""
-        shift = wp.uint32(COMPRESSED_RANK_BITS * (7 - octant))
-        ranks = load_ranks(units, node, lane)
+        units: wp.uint64,
+        node: int,
+        grid: wp.vec4,
+        lane: int,
+        axis: int,
+        near_row: int,
+        rdir: wp.vec2,
+        bias: wp.vec2,
+    ):
+        both = byte_distances(units, node, grid, lane, axis, near_row, rdir, bias)
+        near = vector()
+        far = vector()
         for i in range(length):
-            ranks[i] = (ranks[i] >> shift) & wp.uint32(7)
-        return ranks
+            near[i] = both[i]
+            far[i] = both[length + i]
+        return near, far
 
     @wp.func
-    def bit(order: words, i: int, slot: int):
-        return wp.uint32(1) << order[i]
-
-    @wp.func
-    def before(order: words, i: int, slot: int, hits: wp.uint32):
-        return wp.int32(wp.bit_count(hits & (bit(order, i, slot) - wp.uint32(1))))
+    def used(grid: wp.vec4):
+        return wp.cast(grid[3], wp.uint32) >> wp.uint32(24)
 
     return SimpleNamespace(
         words=COMPRESSED_NODE_WORDS,
-        distances=distances,
-        order=order,
-        order_type=words,
-        bits_are_slots=False,
-        bit=bit,
-        before=before,
         child_row=COMPRESSED_CHILD_ROW,
-        has_child=_has_child,
+        grid=grid,
+        distances=distances,
+        used=used,
+        **_places(
+            lanes,
+            first_plane=4 * COMPRESSED_PLANES,
+            row_bytes=BYTE_ROW_BYTES,
+            order_byte=4 * COMPRESSED_BEHIND_ROW,
+        ),
     )
+
+
+def _places(
+    lanes: SimpleNamespace, *, first_plane: int, row_bytes: int, order_byte: int
+) -> dict[str, wp.Function]:
+    """Where rows begin in a node of this form, in bytes, and the order, which both forms store alike."""
+    eight: bool = lanes.length == 8
+    low_rows = [first_plane + 2 * row_bytes * axis for axis in range(3)]
+    lowest_rows = int.from_bytes(bytes([*low_rows, order_byte]), "little", signed=True)
+
+    @wp.func
+    def low_row(axis: int):
+        """The low planes of an axis; its high planes are behind them."""
+        return first_plane + 2 * row_bytes * axis
+
+    @wp.func
+    def rows_of(octant: int):
+        # Octant 7 - o is octant o backwards.
+        rows = lowest_rows + (NODE_WIDTH << 24) * wp.where(octant > 3, 7 - octant, octant)
+        # Bit a of the octant, moved into byte a: it chooses between rows.
+        return wp.uint32(rows + ((octant * (row_bytes * 0x4081)) & (row_bytes * 0x10101)))
+
+    @wp.func_native(BEHIND_8 if eight else BEHIND_1)
+    def load_behind(units: wp.uint64, node: int, row: int, lane: int) -> wp.vec2ui: ...
+
+    @wp.func
+    def order(units: wp.uint64, node: int, lane: int, rows: wp.uint32):
+        """The slots behind each slot in octants 0 to 3, and whether the ray's octant is one backwards."""
+        behind = load_behind(units, node, byte_of(rows, ORDER_BYTE), lane)
+        backwards = rows & wp.uint32(row_bytes << 16)  # from the high z planes to the low ones
+        return wp.vec3ui(behind[0], behind[1], backwards)
+
+    @wp.func
+    def places(order: wp.vec3ui, hits: wp.uint32, top: int):
+        """The place of the hit that none is behind, and the step from a place to that of a hit before it."""
+        if order[2] != wp.uint32(0):
+            return wp.vec2i(top + wp.int32(wp.bit_count(hits)) - 1, -1)
+        return wp.vec2i(top, 1)
+
+    @wp.func
+    def place(order: wp.vec3ui, places: wp.vec2i, i: int, hits: wp.uint32):
+        """Above the hits that are farther."""
+        behind = (order[i // 4] >> wp.uint32(8 * (i % 4))) & hits
+        return places[0] + places[1] * wp.int32(wp.bit_count(behind))
+
+    return {
+        "low_row": low_row, "rows_of": rows_of,
+        "order": order, "places": places, "place": place,
+    }  # fmt: skip
 
 
 NODES = {"float32": float32_node, "compressed": compressed_node}

@@ -17,12 +17,13 @@ from wive.warp_kernels.lanes.layout import (
     MAX_DEPTH,
     NODE_WIDTH,
     NODE_WORDS,
+    PADDING_WORDS,
     UNIT_WORDS,
     WORD_MASK,
 )
 from wive.warp_kernels.tree.handle import CORRUPTION, HANDLES, KINDS, REFUSAL, USERS_STACK
 from wive.warp_kernels.tree.quiet import launch, quiet
-from wive.warp_kernels.tree.ranks import INVERT_ORDERS
+from wive.warp_kernels.tree.rewriting import REWRITES
 
 # Kernels are compiled for the smallest of these sizes that the tree can't overflow.
 STACK_SIZES = (32, 64, 96, 128, 256, 512)
@@ -81,19 +82,21 @@ class Tree:
 def upload(bvh: _cpu.Bvh, device: wp.DeviceLike = None) -> Tree:
     """Copy the tree to a Warp device ("cpu", "cuda:0", ...; None is Warp's current device).
 
-    Waits until it is there, so that kernels on any stream may use it. The copy differs in one row of each
-    node: `order`, which says which child comes i-th, is turned into the rank of each child, so that a lane
-    finds its place without reading another lane.
+    Waits until it is there, so that kernels on any stream may use it. The copy holds the same boxes, children
+    and triangles at the same places; nodes and compressed blocks are arranged as `layout.py` says.
     """
     with quiet():
         wp.init()
     place = wp.get_device(device)
     nodes = bvh.nodes
-    units: wp.array[Any] = wp.array(bvh.units.reshape(-1).view(np.float32), dtype=wp.float32, device=place)
+    words = wp.array(bvh.units.reshape(-1).view(np.float32), dtype=wp.float32, device="cpu", copy=False)
+    padded: wp.array[Any] = wp.zeros(len(words) + PADDING_WORDS, dtype=wp.float32, device=place)
+    wp.copy(padded, words, count=len(words))
+    units = padded[: len(words)]
     error = wp.zeros(2, dtype=wp.int32, device=place)
     needed = stack_size(nodes)
-    invert = INVERT_ORDERS[bvh.node_form]
-    launch(invert, len(nodes), [units], [], device=place, block_dim=128, record_tape=False)
+    for rewrite in REWRITES[bvh.node_form, bvh.precision]:
+        launch(rewrite, len(nodes), [units], [], device=place, block_dim=128, record_tape=False)
 
     handle = HANDLES[bvh.accuracy, bvh.precision]()
     handle.units = units

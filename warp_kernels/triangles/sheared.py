@@ -43,29 +43,30 @@ def edges_in_lanes(
     The three functions read what the stack keeps of the ray: the mesh axis of a sheared axis, and the origin
     and the shear on a sheared axis.
     """
-    vector, products, load = lanes.triangles, lanes.products, blocks.load
+    vector, products, corners = lanes.triangles, lanes.products, blocks.corners
     stack_argument = lanes.stack_argument
 
     @without_gradient
     @wp.func
     def edges(units: wp.uint64, block: int, lane: int, stack: stack_argument):
-        x = axis_of(stack, 0)
-        y = axis_of(stack, 1)
-        z = axis_of(stack, 2)
+        axes = wp.vec3i(axis_of(stack, 0), axis_of(stack, 1), axis_of(stack, 2))
         ox = vector(origin_of(stack, 0))
         oy = vector(origin_of(stack, 1))
         oz = vector(origin_of(stack, 2))
         sx = vector(shear_of(stack, 0))
         sy = vector(shear_of(stack, 1))
-        za = load(units, block, lane, 0, z) - oz
-        zb = load(units, block, lane, 1, z) - oz
-        zc = load(units, block, lane, 2, z) - oz
-        xa = (load(units, block, lane, 0, x) - ox) - products(sx, za)
-        xb = (load(units, block, lane, 1, x) - ox) - products(sx, zb)
-        xc = (load(units, block, lane, 2, x) - ox) - products(sx, zc)
-        ya = (load(units, block, lane, 0, y) - oy) - products(sy, za)
-        yb = (load(units, block, lane, 1, y) - oy) - products(sy, zb)
-        yc = (load(units, block, lane, 2, y) - oy) - products(sy, zc)
+        xa, ya, za = corners(units, block, lane, 0, axes)
+        xb, yb, zb = corners(units, block, lane, 1, axes)
+        xc, yc, zc = corners(units, block, lane, 2, axes)
+        za = za - oz
+        zb = zb - oz
+        zc = zc - oz
+        xa = (xa - ox) - products(sx, za)
+        xb = (xb - ox) - products(sx, zb)
+        xc = (xc - ox) - products(sx, zc)
+        ya = (ya - oy) - products(sy, za)
+        yb = (yb - oy) - products(sy, zb)
+        yc = (yc - oy) - products(sy, zc)
         u = products(xc, yb) - products(yc, xb)
         v = products(xa, yc) - products(ya, xc)
         w = products(xb, ya) - products(yb, xa)

@@ -26,11 +26,11 @@ def fast_triangles(
     """
     length: int = lanes.triangles_length
     vector, products = lanes.triangles, lanes.products
-    load, edge, edge_at, used = blocks.load, blocks.edge, blocks.edge_at, blocks.used
-    stride_of, vertex_at = blocks.stride, blocks.vertex_at
+    corners, corner, used = blocks.corners, blocks.corner, blocks.used
+    edge_of, edges_of = blocks.edge_of, blocks.edges_of
     stack_argument, frame_type = lanes.stack_argument, FRAMES[precision]
     numbers, ray_numbers = PRECISIONS[precision], stack_numbers(lanes, precision, ray_base)
-    real, vec3, product, load_number = numbers.real, numbers.vec3, numbers.product, numbers.load
+    real, vec3, product = numbers.real, numbers.vec3, numbers.product
     store, load_vector = ray_numbers.store, ray_numbers.load_vector
 
     @wp.func
@@ -53,27 +53,19 @@ def fast_triangles(
             store(stack, ORIGIN + axis, ray.origin[axis])
             store(stack, DIRECTION + axis, ray.direction[axis])
 
-    @without_gradient
     @wp.func
-    def edge_vector(units: wp.uint64, at: int, stride: int, v0: vec3):
-        """The edge from v0 to the vertex at this word."""
-        return vec3(
-            edge_at(units, at, v0[0]),
-            edge_at(units, at + stride, v0[1]),
-            edge_at(units, at + 2 * stride, v0[2]),
-        )
+    def edge_vector(stored: vec3, v0: vec3):
+        """The edge from v0 to another corner."""
+        return vec3(edge_of(stored[0], v0[0]), edge_of(stored[1], v0[1]), edge_of(stored[2], v0[2]))
 
     @without_gradient
     @wp.func
     def solve(units: wp.uint64, block: int, j: int, stack: stack_argument, negative: bool):
         """t, u and v of the block's triangle j, which the ray's line hits."""
-        stride = stride_of(units, block)
-        at = vertex_at(units, block, 0, j)
-        v0 = vec3(
-            load_number(units, at), load_number(units, at + stride), load_number(units, at + 2 * stride)
-        )
-        e1 = edge_vector(units, vertex_at(units, block, 1, j), stride, v0)
-        e2 = edge_vector(units, vertex_at(units, block, 2, j), stride, v0)
+        axes = wp.vec3i(0, 1, 2)
+        v0 = corner(units, block, 0, j, axes)
+        e1 = edge_vector(corner(units, block, 1, j, axes), v0)
+        e2 = edge_vector(corner(units, block, 2, j, axes), v0)
         d = load_vector(stack, DIRECTION)
         p = cross(d, e2)
         s = load_vector(stack, ORIGIN) - v0
@@ -92,15 +84,19 @@ def fast_triangles(
         d0 = vector(d[0])
         d1 = vector(d[1])
         d2 = vector(d[2])
-        sx = vector(o[0]) - load(units, block, lane, 0, 0)
-        sy = vector(o[1]) - load(units, block, lane, 0, 1)
-        sz = vector(o[2]) - load(units, block, lane, 0, 2)
-        e1x = edge(units, block, lane, 1, 0)
-        e1y = edge(units, block, lane, 1, 1)
-        e1z = edge(units, block, lane, 1, 2)
-        e2x = edge(units, block, lane, 2, 0)
-        e2y = edge(units, block, lane, 2, 1)
-        e2z = edge(units, block, lane, 2, 2)
+        axes = wp.vec3i(0, 1, 2)
+        v0x, v0y, v0z = corners(units, block, lane, 0, axes)
+        e1x, e1y, e1z = corners(units, block, lane, 1, axes)
+        e2x, e2y, e2z = corners(units, block, lane, 2, axes)
+        e1x = edges_of(e1x, v0x)
+        e1y = edges_of(e1y, v0y)
+        e1z = edges_of(e1z, v0z)
+        e2x = edges_of(e2x, v0x)
+        e2y = edges_of(e2y, v0y)
+        e2z = edges_of(e2z, v0z)
+        sx = vector(o[0]) - v0x
+        sy = vector(o[1]) - v0y
+        sz = vector(o[2]) - v0z
         px = products(d1, e2z) - products(d2, e2y)
         py = products(d2, e2x) - products(d0, e2z)
         pz = products(d0, e2y) - products(d1, e2x)

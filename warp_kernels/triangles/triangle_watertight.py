@@ -7,7 +7,7 @@ from types import SimpleNamespace
 
 import warp as wp
 
-from wive.warp_kernels.lanes.lanes import load_float, lowest_lane, product, product_double, without_gradient
+from wive.warp_kernels.lanes.lanes import lowest_lane, product, product_double, without_gradient
 from wive.warp_kernels.lanes.precision import stack_numbers
 from wive.warp_kernels.queries.frame import RayFrame, axes_of, component
 from wive.warp_kernels.triangles.sheared import edges_in_lanes, side_passed, sides_beside
@@ -49,7 +49,7 @@ def watertight_triangles(
 ) -> SimpleNamespace:
     """The test for a lane form and block form; its ray is kept from stack word `ray_base` on."""
     length: int = lanes.triangles_length
-    used, stride_of, vertex_at = blocks.used, blocks.stride, blocks.vertex_at
+    used, corner = blocks.used, blocks.corner
     store_word, load_word, stack_argument = lanes.store_word, lanes.load_word, lanes.stack_argument
     numbers = stack_numbers(lanes, precision, ray_base)
     store, load = numbers.store, numbers.load
@@ -93,49 +93,48 @@ def watertight_triangles(
 
     @without_gradient
     @wp.func
-    def rounded(units: wp.uint64, at: int, stride: int, stack: stack_argument):
-        """A vertex in the sheared space, rounded to float alike for every triangle that has it."""
-        z = load_float(units, at + stride * axis_of(stack, 2)) - origin_of(stack, 2)
-        x = (load_float(units, at + stride * axis_of(stack, 0)) - origin_of(stack, 0)) - product(
-            shear_of(stack, 0), z
-        )
-        y = (load_float(units, at + stride * axis_of(stack, 1)) - origin_of(stack, 1)) - product(
-            shear_of(stack, 1), z
-        )
+    def corner_of(units: wp.uint64, block: int, k: int, j: int, stack: stack_argument):
+        """A corner of the block's triangle j by sheared axis."""
+        axes = wp.vec3i(axis_of(stack, 0), axis_of(stack, 1), axis_of(stack, 2))
+        return corner(units, block, k, j, axes)
+
+    @without_gradient
+    @wp.func
+    def rounded(units: wp.uint64, block: int, k: int, j: int, stack: stack_argument):
+        """A corner in the sheared space, rounded to float alike for every triangle that has it."""
+        v = corner_of(units, block, k, j, stack)
+        z = v[2] - origin_of(stack, 2)
+        x = (v[0] - origin_of(stack, 0)) - product(shear_of(stack, 0), z)
+        y = (v[1] - origin_of(stack, 1)) - product(shear_of(stack, 1), z)
         return wp.vec3d(wp.float64(x), wp.float64(y), wp.float64(z))
 
     @without_gradient
     @wp.func
-    def away(units: wp.uint64, at: int, stride: int, stack: stack_argument, axis: int):
-        """The way from the ray's origin to a vertex on a sheared axis, exact or rounded once in double."""
-        return wp.float64(load_float(units, at + stride * axis_of(stack, axis))) - wp.float64(
-            origin_of(stack, axis)
-        )
+    def away(v: wp.vec3, stack: stack_argument, axis: int):
+        """The way from the ray's origin to a corner on a sheared axis, exact or rounded once in double."""
+        return wp.float64(v[axis]) - wp.float64(origin_of(stack, axis))
 
     @without_gradient
     @wp.func
-    def across(units: wp.uint64, at: int, stride: int, stack: stack_argument, axis: int):
-        """A vertex in the plane across the ray, scaled by the direction's longest component."""
+    def across(v: wp.vec3, stack: stack_argument, axis: int):
+        """A corner in the plane across the ray, scaled by the direction's longest component."""
         forward = wp.float64(direction_of(stack, 2))
         slope = wp.float64(direction_of(stack, axis))
-        return product_double(away(units, at, stride, stack, axis), forward) - product_double(
-            slope, away(units, at, stride, stack, 2)
-        )
+        return product_double(away(v, stack, axis), forward) - product_double(slope, away(v, stack, 2))
 
     @without_gradient
     @wp.func(inline=False)
     def solve(units: wp.uint64, block: int, j: int, stack: stack_argument, negative: bool):
         """t, u and v in double, rounded once; those of the rounded triangle if only it is hit."""
-        stride = stride_of(units, block)
-        at_a = vertex_at(units, block, 0, j)
-        at_b = vertex_at(units, block, 1, j)
-        at_c = vertex_at(units, block, 2, j)
-        xa = across(units, at_a, stride, stack, 0)
-        ya = across(units, at_a, stride, stack, 1)
-        xb = across(units, at_b, stride, stack, 0)
-        yb = across(units, at_b, stride, stack, 1)
-        xc = across(units, at_c, stride, stack, 0)
-        yc = across(units, at_c, stride, stack, 1)
+        a = corner_of(units, block, 0, j, stack)
+        b = corner_of(units, block, 1, j, stack)
+        c = corner_of(units, block, 2, j, stack)
+        xa = across(a, stack, 0)
+        ya = across(a, stack, 1)
+        xb = across(b, stack, 0)
+        yb = across(b, stack, 1)
+        xc = across(c, stack, 0)
+        yc = across(c, stack, 1)
         wa = flip(edge_of(xb, yb, xc, yc), negative)
         wb = flip(edge_of(xc, yc, xa, ya), negative)
         wc = flip(edge_of(xa, ya, xb, yb), negative)
@@ -146,10 +145,8 @@ def watertight_triangles(
         if wp.min(wp.min(wa, wb), wc) < wp.float64(0.0) or det <= least:
             return solve_rounded(units, block, j, stack)
         inverse = wp.float64(1.0) / det
-        za = away(units, at_a, stride, stack, 2)
-        zb = away(units, at_b, stride, stack, 2)
-        zc = away(units, at_c, stride, stack, 2)
-        height = product_double(wa, za) + product_double(wb, zb) + product_double(wc, zc)
+        height = product_double(wa, away(a, stack, 2)) + product_double(wb, away(b, stack, 2))
+        height = height + product_double(wc, away(c, stack, 2))
         t = wp.float32(height / (det * wp.float64(direction_of(stack, 2))))
         return wp.vec3(t, wp.float32(wb * inverse), wp.float32(wc * inverse))
 
@@ -157,13 +154,9 @@ def watertight_triangles(
     @wp.func(inline=False)
     def solve_rounded(units: wp.uint64, block: int, j: int, stack: stack_argument):
         """t, u and v of the triangle with rounded corners."""
-        stride = stride_of(units, block)
-        at_a = vertex_at(units, block, 0, j)
-        at_b = vertex_at(units, block, 1, j)
-        at_c = vertex_at(units, block, 2, j)
-        a = rounded(units, at_a, stride, stack)
-        b = rounded(units, at_b, stride, stack)
-        c = rounded(units, at_c, stride, stack)
+        a = rounded(units, block, 0, j, stack)
+        b = rounded(units, block, 1, j, stack)
+        c = rounded(units, block, 2, j, stack)
         w = edges_of(a, b, c)
         det = w[0] + w[1] + w[2]
         height = product_double(w[0], a[2]) + product_double(w[1], b[2]) + product_double(w[2], c[2])
@@ -174,13 +167,9 @@ def watertight_triangles(
     @wp.func(inline=False)
     def side_of(units: wp.uint64, block: int, j: int, stack: stack_argument):
         """The side on which the ray passes the edges, 1 or -1, decided exactly; 0 if it misses."""
-        stride = stride_of(units, block)
-        at_a = vertex_at(units, block, 0, j)
-        at_b = vertex_at(units, block, 1, j)
-        at_c = vertex_at(units, block, 2, j)
-        a = rounded(units, at_a, stride, stack)
-        b = rounded(units, at_b, stride, stack)
-        c = rounded(units, at_c, stride, stack)
+        a = rounded(units, block, 0, j, stack)
+        b = rounded(units, block, 1, j, stack)
+        c = rounded(units, block, 2, j, stack)
         sides = edges_of(a, b, c)
         if wp.static(crossings):
             sides = sides_beside(sides, a, b, c)
@@ -202,12 +191,16 @@ def watertight_triangles(
         hit_mask = used(units, block, lane, hit_mask)
         negative = wp.uint32(0)
         if hit_mask != wp.uint32(0):
-            ties = wp.uint32(0)
+            any_tie = bool(False)
             for i in range(length):
                 if low[i] < 0.0:
                     negative = negative | wp.uint32(1 << i)
-                if u[i] == 0.0 or v[i] == 0.0 or w[i] == 0.0:
-                    ties = ties | wp.uint32(1 << i)
+                any_tie = any_tie or low[i] == 0.0 or high[i] == 0.0
+            ties = wp.uint32(0)
+            if any_tie:
+                for i in range(length):
+                    if low[i] == 0.0 or high[i] == 0.0:
+                        ties = ties | wp.uint32(1 << i)
             # An edge function of zero may hide a sign; it is computed again in double, which holds products.
             ties = ties & hit_mask
             while ties != wp.uint32(0):

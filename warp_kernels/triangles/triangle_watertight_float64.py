@@ -8,7 +8,7 @@ from types import SimpleNamespace
 
 import warp as wp
 
-from wive.warp_kernels.lanes.lanes import load_double, product_double, without_gradient
+from wive.warp_kernels.lanes.lanes import product_double, without_gradient
 from wive.warp_kernels.lanes.native import EXACT_WEIGHT
 from wive.warp_kernels.lanes.precision import stack_numbers
 from wive.warp_kernels.queries.frame import RayFrame64, axes_of, component
@@ -57,7 +57,7 @@ def watertight_doubles(
 ) -> SimpleNamespace:
     """The test for a lane form and block form; its ray is kept from stack word `ray_base` on."""
     length: int = lanes.triangles_length
-    used, stride_of, vertex_at = blocks.used, blocks.stride, blocks.vertex_at
+    used, corner = blocks.used, blocks.corner
     store_word, load_word, stack_argument = lanes.store_word, lanes.load_word, lanes.stack_argument
     numbers = stack_numbers(lanes, precision, ray_base + AXIS_WORDS)
     store, load = numbers.store, numbers.load
@@ -97,11 +97,11 @@ def watertight_doubles(
     @wp.func
     def sheared(units: wp.uint64, block: int, j: int, k: int, stack: stack_argument):
         """A vertex in the sheared space, rounded alike for every triangle that has it."""
-        at = vertex_at(units, block, k, j)
-        stride = stride_of(units, block)
-        z = load_double(units, at + stride * axis_of(stack, 2)) - origin_of(stack, 2)
-        x = load_double(units, at + stride * axis_of(stack, 0)) - origin_of(stack, 0)
-        y = load_double(units, at + stride * axis_of(stack, 1)) - origin_of(stack, 1)
+        axes = wp.vec3i(axis_of(stack, 0), axis_of(stack, 1), axis_of(stack, 2))
+        v = corner(units, block, k, j, axes)
+        z = v[2] - origin_of(stack, 2)
+        x = v[0] - origin_of(stack, 0)
+        y = v[1] - origin_of(stack, 1)
         return wp.vec3d(
             x - product_double(shear_of(stack, 0), z), y - product_double(shear_of(stack, 1), z), z
         )
