@@ -55,7 +55,7 @@ def main() -> None:
     paths = parser.parse_args().meshes
     if len(paths) not in (0, 2):
         parser.error("expected two mesh files or none")
-    vertices, faces = vase(60, 60)
+    vertices, faces = vase(rings=60, sections=60)
     if paths:
         one, other = map(wive.Scene.from_file, paths)
     else:

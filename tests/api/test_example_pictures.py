@@ -33,7 +33,7 @@ def test_a_program_leaves_a_picture_and_says_so(
         pytest.importorskip(NEEDS[name])
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(sys, "argv", [name])
-    monkeypatch.setattr(meshes, "vase", partial(meshes.vase, 50, 50))
+    monkeypatch.setattr(meshes, "vase", partial(meshes.vase, rings=50, sections=50))
     program = example(name)
     for number, fewer in FEWER.get(name, {}).items():
         monkeypatch.setattr(program, number, fewer)
