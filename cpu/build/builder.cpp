@@ -13,6 +13,7 @@
 #include "core/ensure.h"
 #include "core/parallel.h"
 #include "core/progress.h"
+#include "core/thread_count.h"
 
 namespace wive {
 
@@ -37,6 +38,14 @@ constexpr double refs_end = 0.12, binary_end = 0.75, high_quality_share = 0.25;
 // On each axis, a mesh's middle is at most this many half extents away from its tree's centre.
 constexpr double far_from_center = 4;
 
+// A helper thread takes as long to start as some hundred triangles take to build. A small mesh is built without.
+constexpr std::size_t triangles_per_thread = 2048;
+
+unsigned threads_for(std::size_t triangles, unsigned requested) {
+    const std::size_t worth = 1 + triangles / triangles_per_thread;
+    return static_cast<unsigned>(std::min<std::size_t>(thread_count(requested), worth));
+}
+
 double half_size_of(const Bounds& bounds) {
     const auto& [low, high] = bounds;
     return 0.5 * std::max({high[0] - low[0], high[1] - low[1], high[2] - low[2]});
@@ -52,7 +61,7 @@ Bvh::Bvh(const Mesh<Real>& mesh, const BuildOptions& options) {
     facts_.precision = precision_of<Real>;
     facts_.form = options.nodes;
     constexpr bool doubles = precision_of<Real> == Precision::float64;
-    Threads threads(thread_count(options.threads));
+    Threads threads(threads_for(mesh.face_count, options.threads));
     if (mesh.face_count >= leaf_bit) throw too_many_triangles(mesh.face_count);
     if (doubles && facts_.accuracy == Accuracy::exact)
         throw std::invalid_argument(

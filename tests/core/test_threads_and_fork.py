@@ -1,15 +1,18 @@
 """Results depend on the rays alone, in threads and in forked processes."""
 
 import multiprocessing
+import os
 import threading
 import time
 import warnings
+from pathlib import Path
 
 import numpy as np
 import pytest
 from support.meshes import random_rays, soup, sphere
 
 import wive
+from wive import _cpu
 
 
 def answers(scene: wive.Scene, rays: tuple[np.ndarray, np.ndarray], **options) -> list[np.ndarray]:
@@ -150,3 +153,31 @@ def test_other_python_threads_run_while_rays_are_traced(monkeypatch, work):
     ((ticked, seconds),) = seen
     assert seconds > 0.02
     assert ticked >= 5
+
+
+@pytest.mark.skipif(not Path("/proc/self/task").is_dir(), reason="counts threads by Linux's /proc")
+def test_only_a_mesh_that_is_worth_it_starts_threads():
+    def most_threads(triangles: int) -> int:
+        """The most threads at a time that this process was seen to have more than before."""
+        mesh = soup(triangles, seed=8)
+        seen, done = [0], threading.Event()
+
+        def watch() -> None:
+            while not done.is_set():
+                seen.append(len(os.listdir("/proc/self/task")))
+
+        watcher = threading.Thread(target=watch)
+        watcher.start()
+        before = len(os.listdir("/proc/self/task"))
+        try:
+            end = time.monotonic() + 0.5
+            while time.monotonic() < end:
+                _cpu.Bvh(*mesh, threads=4)
+        finally:
+            done.set()
+            watcher.join()
+        return max(seen) - before
+
+    assert most_threads(12) == 0
+    assert most_threads(2000) == 0
+    assert most_threads(100_000) == 3
