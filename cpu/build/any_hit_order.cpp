@@ -55,10 +55,10 @@ void sort_slots_for_any_hit(const BinaryTree& tree, const ProjectedAreaPrefixSum
     alignas(16) std::array<std::int32_t, node_width> score;
     score.fill(std::numeric_limits<std::int32_t>::max());
     for (std::size_t i = 0; i < count; ++i) {
-        const Subtree& slot = treelet.slots[i].tree;
-        const float area = tree.box_of(slot).half_area(tree.area_scale);
-        const float covered = area > 0 ? static_cast<float>(areas.of(slot)) / area : 0;
-        score[i] = std::bit_cast<std::int32_t>(covered * covered / static_cast<float>(slot.size()));
+        const Slot& slot = treelet.slots[i];
+        const float area = slot.box.half_area(tree.area_scale);
+        const float covered = area > 0 ? static_cast<float>(areas.of(slot.tree)) / area : 0;
+        score[i] = std::bit_cast<std::int32_t>(covered * covered / static_cast<float>(slot.tree.size()));
     }
     alignas(16) std::array<std::uint32_t, node_width> place{};
     for (std::size_t k = 0; k < node_width; ++k)

@@ -27,7 +27,7 @@ SlotSequences add_slots(const BinaryTree& tree, Treelet& treelet, const Subtree&
     }
     ensure(treelet.count < node_width, "a node of at most 8 children");
     const int slot = treelet.count++;
-    treelet.slots[static_cast<std::size_t>(slot)] = {top, leaf};
+    treelet.slots[static_cast<std::size_t>(slot)] = {top, leaf, tree.box_of(top)};
     count = 1;
     return single_slot(static_cast<std::uint32_t>(slot));
 }
@@ -115,7 +115,7 @@ Treelet collect_root_children(const BinaryTree& tree) {
     if (tree.root().has_node()) return collect_children(tree, tree.root());
     Treelet treelet;
     treelet.order = single_slot(0);
-    if (tree.count > 0) treelet.slots[static_cast<std::size_t>(treelet.count++)] = {tree.root(), true};
+    if (tree.count > 0) treelet.slots[static_cast<std::size_t>(treelet.count++)] = {tree.root(), true, tree.box};
     return treelet;
 }
 

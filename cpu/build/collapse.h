@@ -34,6 +34,7 @@ SlotCosts store_node(BinaryTree& tree, const Subtree& top, const Box& box, std::
 struct Slot {
     Subtree tree;
     bool leaf;  // else a wide node
+    Box box;
 };
 
 // The children of a wide node and their order for each octant.

@@ -16,6 +16,7 @@
 #include "core/ensure.h"
 #include "core/parallel.h"
 #include "core/progress.h"
+#include "core/ray.h"
 
 namespace wive {
 
@@ -23,8 +24,9 @@ namespace {
 
 // A thread emits one subtree at a time. There are about subtree_count of them, within these numbers of triangles.
 constexpr std::uint32_t subtree_count = 64, largest_subtree = 1 << 14, smallest_subtree = 1 << 10;
-// What a subtree of this size is written from is fetched beforehand: it fits the cache.
-constexpr std::uint32_t prefetched_size = 128;
+// What a subtree of this size is written from is fetched beforehand: it fits the cache. Its references are fetched
+// with those of a larger subtree around it, since what else is fetched depends on them.
+constexpr std::uint32_t prefetched_size = 128, prefetched_refs = 4 * prefetched_size;
 
 // A leaf's prims in ascending order. choose_collapse makes no leaf of more than max_leaf_blocks.
 class LeafPrims {
@@ -32,11 +34,26 @@ public:
     LeafPrims(const BinaryTree& tree, const Subtree& leaf) : count_(leaf.size()) {
         ensure(count_ <= prims_.size(), "a leaf of at most max_leaf_blocks blocks");
         for (std::uint32_t i = 0; i < count_; ++i) prims_[i] = tree.refs[leaf.begin + i].prim();
-        std::sort(prims_.begin(), prims_.begin() + count_);
+        if (count_ <= block_width)
+            sort_block();
+        else
+            std::sort(prims_.begin(), prims_.begin() + count_);
     }
     std::span<const std::uint32_t> span() const { return {prims_.data(), count_}; }
 
 private:
+    // A sorting network of five comparisons: no branch, whose way no processor would foresee.
+    void sort_block() {
+        static_assert(block_width == 4);
+        constexpr std::array<std::array<std::size_t, 2>, 5> pairs{{{0, 1}, {2, 3}, {0, 2}, {1, 3}, {1, 2}}};
+        std::fill(prims_.begin() + count_, prims_.begin() + block_width, no_prim);  // which sorts last
+        for (const auto& [i, j] : pairs) {
+            const std::uint32_t low = std::min(prims_[i], prims_[j]), high = std::max(prims_[i], prims_[j]);
+            prims_[i] = low;
+            prims_[j] = high;
+        }
+    }
+
     std::array<std::uint32_t, block_width * max_leaf_blocks> prims_;
     std::uint32_t count_;
 };
@@ -186,6 +203,7 @@ private:
 
     // Emits a subtree from `cursor` on. Returns its depth in nodes.
     int emit_subtree(const Slot& slot, std::size_t place, Size& cursor, bool prefetched = false) {
+        if (slot.tree.size() <= prefetched_refs && slot.tree.size() > prefetched_size) prefetch_refs(slot.tree);
         if (!prefetched && slot.tree.size() <= prefetched_size) {
             prefetched = true;
             prefetch(slot.tree);
@@ -213,13 +231,17 @@ private:
         for (std::uint32_t i = tree.begin; i < tree.end; ++i) mesh_.prefetch_corners(tree_.refs[i].prim());
     }
 
+    // Some hundred at once: neither do they follow each other subtree by subtree, nor does a processor foresee where
+    // the next begin.
+    void prefetch_refs(const Subtree& tree) const {
+        for (std::uint32_t i = tree.begin; i < tree.end; i += 2) __builtin_prefetch(&tree_.refs[i]);
+    }
+
     void write_node(std::size_t place, const Treelet& treelet, const Children& children) const {
         ensure(place < total_.nodes, "as many nodes as planned");
         Node node;
         for (int i = 0; i < node_width; ++i) {
-            write_box(node, i,
-                      i < treelet.count ? tree_.box_of(treelet.slots[static_cast<std::size_t>(i)].tree) : Box{},
-                      center_);
+            write_box(node, i, i < treelet.count ? treelet.slots[static_cast<std::size_t>(i)].box : Box{}, center_);
             node.child[i] = i < treelet.count ? children[static_cast<std::size_t>(i)] : end_of_stack;
         }
         ensure(is_permutation(treelet.order, treelet.count), "an order row of permutations");

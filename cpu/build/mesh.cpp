@@ -54,7 +54,6 @@ bool has_area(const Real* a, const Real* b, const Real* c) {
 }
 
 Float4v yzx(Float4v x) { return __builtin_shufflevector(x, x, 1, 2, 0, 3); }
-Float4v magnitude(Float4v x) { return maximum(x, Float4v{} - x); }
 
 float projected_area(Float4v a, Float4v b, Float4v c) {
     const Float4v u = b - a, v = c - a, areas = magnitude(u * yzx(v) - yzx(u) * v);
@@ -98,17 +97,6 @@ float projected_area(const double* a, const double* b, const double* c) {
     return static_cast<float>(std::abs(x) + std::abs(y) + std::abs(z));
 }
 
-// A corner, with zero in lane 3. Reads four floats, except for the last vertex, behind which there may be no memory.
-Float4v load_corner(const Mesh<float>& mesh, std::size_t face, int k) {
-    const std::size_t vertex = mesh.vertex(face, k);
-    const float* v = mesh.vertices + 3 * vertex;
-    if (vertex + 1 == mesh.vertex_count) return Float4v{v[0], v[1], v[2], 0};
-    Int4v bits;
-    std::memcpy(&bits, v, sizeof bits);
-    const Int4v xyz = {-1, -1, -1, 0};
-    return std::bit_cast<Float4v>(bits & xyz);
-}
-
 // Which vertices are in a face. Any number may stand in the others.
 template <class Real>
 std::vector<bool> used_vertices(const Mesh<Real>& mesh) {
@@ -118,13 +106,6 @@ std::vector<bool> used_vertices(const Mesh<Real>& mesh) {
         if (index < mesh.vertex_count) used[index] = true;
     }
     return used;
-}
-
-// Whether all coordinates are of at most max_coordinate, and none is NaN.
-bool are_in_range(Float4v a, Float4v b, Float4v c) {
-    const Float4v most = Float4v{} + max_coordinate<float>;
-    const Int4v in_range = (magnitude(a) <= most) & (magnitude(b) <= most) & (magnitude(c) <= most);
-    return (in_range[0] & in_range[1] & in_range[2]) != 0;
 }
 
 bool has_area(Float4v a, Float4v b, Float4v c) {

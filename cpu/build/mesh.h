@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 #include <stdexcept>
 
 #include "core/box.h"
@@ -57,6 +58,26 @@ struct Mesh {
         return in_range;
     }
 };
+
+inline Float4v magnitude(Float4v x) { return maximum(x, Float4v{} - x); }
+
+// A corner, with zero in lane 3. Reads four floats, except for the last vertex, behind which there may be no memory.
+inline Float4v load_corner(const Mesh<float>& mesh, std::size_t face, int k) {
+    const std::size_t vertex = mesh.vertex(face, k);
+    const float* v = mesh.vertices + 3 * vertex;
+    if (vertex + 1 == mesh.vertex_count) return Float4v{v[0], v[1], v[2], 0};
+    Int4v bits;
+    std::memcpy(&bits, v, sizeof bits);
+    const Int4v xyz = {-1, -1, -1, 0};
+    return std::bit_cast<Float4v>(bits & xyz);
+}
+
+// Whether all coordinates are of at most max_coordinate, and none is NaN.
+inline bool are_in_range(Float4v a, Float4v b, Float4v c) {
+    const Float4v most = Float4v{} + max_coordinate<float>;
+    const Int4v in_range = (magnitude(a) <= most) & (magnitude(b) <= most) & (magnitude(c) <= most);
+    return (in_range[0] & in_range[1] & in_range[2]) != 0;
+}
 
 // A mesh of its own, which no other thread changes.
 class MeshCopy {

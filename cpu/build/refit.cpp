@@ -69,6 +69,7 @@ private:
     void fit_node(std::uint32_t node, std::size_t& lost, const BoxOfInner& box_of_inner) {
         const Node& old = from_.template node<Form>(node);
         Box* boxes = boxes_.data() + node_width * index_of(node);
+        prefetch_leaves(old);
         for (int lane = 0; lane < node_width; ++lane) {
             const std::uint32_t child = old.child[lane];
             if (child == end_of_stack)
@@ -81,6 +82,21 @@ private:
     Box fit_subtree(std::uint32_t node, std::size_t& lost) {
         fit_node(node, lost, [&](std::uint32_t child) { return fit_subtree(child, lost); });
         return box_of(node);
+    }
+
+    // Fetches what the leaves of a node are made of, which lies anywhere in memory.
+    void prefetch_leaves(const Node& node) const {
+        const auto each_prim = [&](const auto& fetch) {
+            for (const std::uint32_t child : node.child) {
+                if (is_inner(child) || child == end_of_stack) continue;
+                const Block* block = from_.template leaf<Form>(child);
+                for (std::uint32_t i = 0; i < leaf_block_count(child); ++i)
+                    for (const std::int32_t prim : block[i].prim)
+                        if (prim >= 0) fetch(static_cast<std::uint32_t>(prim));
+            }
+        };
+        each_prim([&](std::uint32_t prim) { mesh_.prefetch_face(prim); });
+        each_prim([&](std::uint32_t prim) { mesh_.prefetch_corners(prim); });
     }
 
     Box fit_leaf(std::uint32_t leaf, std::size_t& lost) {

@@ -18,20 +18,23 @@ Box refit_leaf(const TriangleBlockOf<Real>* old, TriangleBlockOf<Real>* to, std:
                const Mesh<Real>& mesh, const Point& center, Accuracy accuracy, const Lost& lost) {
     Box all;
     for (std::uint32_t i = 0; i < blocks; ++i) {
-        std::int32_t prims[block_width];
-        std::copy(std::begin(old[i].prim), std::end(old[i].prim), prims);
-        clear_block(to[i]);
+        std::uint32_t prims[block_width];
+        bool has_area[block_width];
         for (std::uint32_t lane = 0; lane < block_width; ++lane) {
-            if (prims[lane] < 0) continue;
-            const auto prim = static_cast<std::uint32_t>(prims[lane]);
+            const bool is_used = old[i].prim[lane] >= 0;
+            prims[lane] = static_cast<std::uint32_t>(old[i].prim[lane]);
             Box box;
-            if (!box_triangle(mesh, center, prim, box)) {
-                lost(prim);
-                continue;
-            }
-            write_triangle(to[i], lane, mesh, prim, accuracy);
-            all.grow(box);
+            has_area[lane] = is_used && box_triangle(mesh, center, prims[lane], box);
+            if (has_area[lane])
+                all.grow(box);
+            else if (is_used)
+                lost(prims[lane]);
         }
+        if (has_area[0] && has_area[1] && has_area[2] && has_area[3] && write_full_block(to[i], mesh, prims, accuracy))
+            continue;
+        clear_block(to[i]);
+        for (std::uint32_t lane = 0; lane < block_width; ++lane)
+            if (has_area[lane]) write_triangle(to[i], lane, mesh, prims[lane], accuracy);
     }
     return all;
 }

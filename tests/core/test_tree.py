@@ -37,6 +37,15 @@ def test_every_triangle_is_in_exactly_one_leaf(mesh: tuple[np.ndarray, np.ndarra
     assert sorted(prims[prims >= 0]) == list(range(len(mesh[1])))
 
 
+def test_a_leaf_has_its_triangles_in_the_callers_order(bvh: _cpu.Bvh) -> None:
+    for *_, child in walk(bvh):
+        if child >= LEAF:
+            prims = bvh.blocks[list(leaf_blocks(bvh, child)), 9].view(np.int32).ravel()
+            used = prims >= 0
+            assert used[: used.sum()].all()
+            assert (np.diff(prims[used]) > 0).all()
+
+
 def test_every_box_holds_its_triangles_and_its_childrens_boxes(
     mesh: tuple[np.ndarray, np.ndarray], bvh: _cpu.Bvh
 ) -> None:
