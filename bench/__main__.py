@@ -24,6 +24,7 @@ BENCHES = {
     "peers": "tinybvh and madmann91/bvh, compiled from their sources, against wive",
     "python": "embreex, trimesh, Warp and wive from Python, NumPy arrays in and out",
     "quality": 'what quality="high" saves in steps per ray and costs in build time',
+    "spawn": "spawned origins, points, normals and error bounds over the trace's own time, one core",
     "stream": "rays of files in pieces, to files, over one batch in memory, all cores",
     "gpu-prepare": "not a bench: packs Warp and scenes for a GPU machine without a package index",
     "draw": "not a bench: draws the figures of bench/results again",

@@ -143,3 +143,13 @@ def test_a_tower_hides_the_sky_from_the_ground_beside_it() -> None:
     assert (sky[middle, middle] == 1).all()
     assert sky[9, 12] < 0.75 and sky[12, 9] < 0.75, "beside the tower"
     assert sky[0, 0] > 0.95, "the far corner sees nearly all"
+
+
+def test_a_script_for_embreex_finds_the_shadow_of_its_ball() -> None:
+    sun = np.array([0.7, 0.2, 1.0])
+    lit = example("embreex_script").lit(tuple(sun), side=41)
+    x, y = np.meshgrid(np.linspace(-4, 4, 41), np.linspace(-4, 4, 41))
+    to_middle = np.stack([-x, -y, np.full_like(x, 2)], axis=-1)
+    aside = np.linalg.norm(np.cross(to_middle, sun / np.linalg.norm(sun)), axis=-1)  # of the ray, from the ball
+    sure = abs(aside - 1) > 0.02
+    assert (lit == (aside > 1))[sure].all() and (~lit).sum() > 90
