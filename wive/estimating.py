@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import DTypeLike
 
 from wive._internal import arguments
-from wive._internal.arguments import NodesOption, QualityOption
+from wive._internal.options import NodesOption, QualityOption
 from wive._internal.precision import real_named
 
 TREE_LIMIT = 8 << 30  # bytes that a tree can have

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wive import _cpu
-from wive._internal import arguments
+from wive._internal import options
 from wive._internal.picture import Colours, How, Image, Look, Settings, Shading
 from wive._internal.pictures.albedo import Albedo, albedo_of
 from wive._internal.pictures.daylight import light_of, up_of_frame
@@ -171,7 +171,7 @@ def planned(scene: Scene, camera: Perspective | None, settings: Settings) -> Pla
             "scene must be of float32 vertices to be path-traced, got float64: use another shading, or "
             "make one with (vertices - vertices.mean(axis=0)).astype(np.float32)"
         )
-    arguments.refuse_lacking(scene.backend, scene._tracer.lacks, {"threads": settings.threads})
+    options.refuse_lacking(scene.backend, scene._tracer.lacks, {"threads": settings.threads})
     albedo = albedo_of(settings.albedo, scene)
     width, height = settings.width, settings.height
     if camera is None:
@@ -222,7 +222,7 @@ def _look(settings: Settings, albedo: Albedo, frame: NDArray[np.float64], camera
     up = up_of_frame(frame) if isinstance(camera, PinholeCamera) else unit_vector("up", camera.up)
     light = light_of(settings.sky, settings.sun, frame, up)
     kind = "gray" if albedo.kind == "none" else albedo.kind
-    threads = arguments.threads(settings.threads)
+    threads = options.threads(settings.threads)
     return Look(settings.spp, settings.bounces, kind, albedo.colours, light, settings.seed, threads)
 
 

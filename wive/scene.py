@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from wive import _cpu
-from wive._internal import arguments
-from wive._internal.arguments import AccuracyOption, NodesOption, QualityOption
+from wive._internal import arguments, mesh_arguments
 from wive._internal.cpu_tracer import CpuTracer
 from wive._internal.files import PathLike, file_name
 from wive._internal.heightfield import heightfield_mesh
@@ -20,6 +19,7 @@ from wive._internal.host_arrays import host_array
 from wive._internal.known_meshes import know_again, make_known
 from wive._internal.mesh_objects import MeshObject, PlacedMeshes, mesh_arrays
 from wive._internal.moving_part import move_in_place
+from wive._internal.options import AccuracyOption, NodesOption, QualityOption
 from wive._internal.point_queries import PointQueries
 from wive._internal.precision import Floats, Precision, real_of
 from wive._internal.process_lock import PROCESS_LOCK
@@ -110,7 +110,7 @@ class Scene(Queries, PointQueries):
         elif faces is None:
             rounding, (vertices, faces) = "dtype=np.float32", mesh_arrays(vertices)
         given = host_array("vertices", vertices), host_array("faces", faces)
-        mesh = arguments.mesh(*given, accuracy, dtype, rounding)
+        mesh = mesh_arguments.mesh(*given, accuracy, dtype, rounding)
         points, faces = map(arguments.read_only, mesh)
         bvh = reported(
             checked_progress(progress),
@@ -180,7 +180,7 @@ class Scene(Queries, PointQueries):
         """
         joined = join(meshes, kwargs.get("dtype"), kwargs.get("accuracy", "watertight"))
         try:
-            return cls(joined, **kwargs)
+            return cls(joined, None, **kwargs)
         except ValueError:
             name_the_mesh(joined)
             raise
@@ -196,7 +196,8 @@ class Scene(Queries, PointQueries):
             z: (rows, columns) heights. A NaN or masked one is a hole: the cells around it are left out. Mask
                 the number that stands for no data.
             x: (columns,) and
-            y: (rows,) their coordinates, each ascending or descending, not necessarily in even steps.
+            y: (rows,) their coordinates, each ascending or descending, not necessarily in even steps, also
+                as rounded to the scene's precision.
 
         The scene is float64 if one of the three is an array of float64, as survey coordinates need, else
         float32. Vertex i * columns + j is z[i, j]. Triangle `prim` lies in the cell of rows i, i + 1 and
@@ -207,7 +208,8 @@ class Scene(Queries, PointQueries):
 
         >>> scene = wive.Scene.from_heightfield(elevation, easting, northing)
         """
-        return cls(*heightfield_mesh(z, x, y, kwargs.get("accuracy", "watertight")), **kwargs)
+        mesh = heightfield_mesh(z, x, y, kwargs.get("accuracy", "watertight"), kwargs.get("dtype"))
+        return cls(*mesh, **kwargs)
 
     @classmethod
     def _of_tracer(cls, tracer: Tracer, faces: NDArray[np.int32], options: Options) -> Scene:
@@ -245,7 +247,7 @@ class Scene(Queries, PointQueries):
 
         def refitted() -> Tracer | None:
             if geom is None:
-                points = arguments.moved_vertices(given, len(self.vertices), self._real)
+                points = mesh_arguments.moved_vertices(given, len(self.vertices), self._real)
                 return self._tracer.refitted(arguments.read_only(points))
             i = arguments.integer("geom", geom, 0, len(self.geoms) - 1)
             rows = moved_rows(self.geoms, i, given, self._real)

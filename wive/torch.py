@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 
 import torch
 
-from wive._internal.arguments import LanesOption
+from wive._internal.options import LanesOption
 from wive.hits import Hits
 from wive.scene import Scene
 

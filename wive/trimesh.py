@@ -17,9 +17,10 @@ import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from wive._internal import arguments
-from wive._internal.arguments import AccuracyOption, NodesOption, QualityOption
 from wive._internal.inside import closedness, contains, passes_of
 from wive._internal.mesh_rays import MeshRays, mesh_class, rays_of, set_rays
+from wive._internal.options import AccuracyOption, NodesOption, QualityOption, refuse_lacking
+from wive._internal.options import threads as checked_threads
 from wive._internal.placed_mesh import Float64, Found, Int64, PlacedMesh
 from wive._internal.precision import FLOAT64, Floats, real_asked
 from wive.scene import Scene
@@ -251,8 +252,8 @@ def install(**options: Unpack[IntersectorOptions]) -> None:
     current = rays_of(kind)
     if current is None or current.options != options:
         probe = RayMeshIntersector(_NoMesh(), **options).scene
-        arguments.threads(options.get("threads"))
-        arguments.refuse_lacking(probe.backend, probe._tracer.lacks, {"threads": options.get("threads")})
+        checked_threads(options.get("threads"))
+        refuse_lacking(probe.backend, probe._tracer.lacks, {"threads": options.get("threads")})
         set_rays(kind, MeshRays(RayMeshIntersector, {**options}))
 
 

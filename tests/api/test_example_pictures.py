@@ -150,6 +150,8 @@ def test_a_script_for_embreex_finds_the_shadow_of_its_ball() -> None:
     lit = example("embreex_script").lit(tuple(sun), side=41)
     x, y = np.meshgrid(np.linspace(-4, 4, 41), np.linspace(-4, 4, 41))
     to_middle = np.stack([-x, -y, np.full_like(x, 2)], axis=-1)
-    aside = np.linalg.norm(np.cross(to_middle, sun / np.linalg.norm(sun)), axis=-1)  # of the ray, from the ball
+    aside = np.linalg.norm(
+        np.cross(to_middle, sun / np.linalg.norm(sun)), axis=-1
+    )  # of the ray, from the ball
     sure = abs(aside - 1) > 0.02
     assert (lit == (aside > 1))[sure].all() and (~lit).sum() > 90

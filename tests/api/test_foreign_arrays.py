@@ -193,3 +193,34 @@ def test_jax():
         scene.intersect(numpy.zeros((3, 3), numpy.bfloat16), numpy.zeros((3, 3)))
     with pytest.raises(TypeError, match=r"^origins must be an array that NumPy can read"):
         jax.jit(lambda rays: scene.intersect(rays, rays).t)(numpy.ones((3, 3)))
+
+
+def torch_that_learns(values):
+    return pytest.importorskip("torch").tensor(values, requires_grad=True)
+
+
+@pytest.mark.parametrize("make", [Foreign.Array, Exporting, torch_that_learns])
+def test_every_entry_point_reads_arrays_of_other_libraries(make):
+    """Cameras, lights, embreex's scenes and trimesh's rays, as scenes do; also tensors with gradients."""
+    scene, eye, middle = wive.Scene(*sphere(2)), np.array([0.5, 1, 4]), np.zeros(3)
+    pose, lens, angles = np.eye(4), np.array([9.0, 9, 4, 4]), np.array([-10.0, 0, 10])
+    for of in (
+        lambda given: wive.Camera(given(eye), given(middle)).rays(4, 3),
+        lambda given: wive.PinholeCamera(given(lens), given(pose)).rays(4, 3),
+        lambda given: wive.OrthographicCamera(given(eye), given(middle)).rays(4, 3),
+        lambda given: wive.EquirectangularCamera(given(eye), given(middle)).rays(4, 3),
+        lambda given: wive.SpinningLidar(given(angles), given(angles), given(pose)).rays(),
+        lambda given: [wive.render(scene, shading="path", sun=given(eye), width=8, height=4, spp=1)],
+    ):
+        for found, expected in zip(of(make), of(np.asarray), strict=True):
+            np.testing.assert_array_equal(found, expected)
+    origins, directions = (rows.astype(np.float64) for rows in RAYS)
+    theirs = wive.embreex.EmbreeScene()
+    wive.embreex.TriangleMesh(theirs, make(scene.vertices.astype(np.float64)), scene.faces)
+    run = theirs.run(make(origins), make(directions), dists=make(np.full(len(origins), 9.0)))
+    np.testing.assert_array_equal(run, theirs.run(origins, directions, dists=9.0))
+    trimesh = pytest.importorskip("trimesh")
+    ray = wive.trimesh.RayMeshIntersector(trimesh.creation.icosphere())
+    found = ray.intersects_first(make(origins), make(directions))
+    np.testing.assert_array_equal(found, ray.intersects_first(origins, directions))
+    np.testing.assert_array_equal(ray.contains_points(make(origins)), ray.contains_points(origins))

@@ -153,6 +153,7 @@ Z = np.zeros((3, 4))
         ((Z, 1.0, range(3)), ValueError, "x must have shape (4,), one per column of z, got ()"),
         ((Z, [0, 1, 1, 2], range(3)), ValueError, "x must ascend or descend from column to column, got 1 after 1 at 2"),
         ((Z, range(4), np.array([5, 4, 4.5])), ValueError, "y must ascend or descend from row to row, got 4.5 after 4.0 at 2"),
+        ((Z.astype(np.float32), [7e7, 7e7 + 1, 8e7, 9e7], range(3)), ValueError, "x must differ from column to column in float32, the scene's precision, got 70000000.0 and 70000001.0 at 1, both 70000000.0: subtract a number from x, or make a float64 scene"),
         ((Z, [0, 1, NAN, 2], range(3)), ValueError, "x must be finite, got nan at 2"),
         ((Z, range(4), np.ma.MaskedArray([0.0, 1, 2], [False, True, False])), ValueError, "y must be finite, got nan at 1"),
         ((np.where(np.eye(3, 4), np.inf, Z), range(4), range(3)), ValueError, "z must be finite, or NaN or masked for holes, got inf at [0, 0]"),
@@ -165,3 +166,16 @@ def test_grids_of_no_sense_are_refused_in_one_line(arguments, kind, message):
     with pytest.raises(kind) as error:
         wive.Scene.from_heightfield(*arguments)
     assert str(error.value) == message
+
+
+def test_steps_that_the_scenes_precision_cannot_hold_are_refused_and_others_taken():
+    """Survey coordinates in steps of a centimetre: as float32 all of a row fell into one place, unhit."""
+    z, northing = np.zeros((3, 4)), 4_042_318 + np.arange(3.0)
+    easting = 743_512 + 0.01 * np.arange(4)
+    above, down = [(easting[1] + 0.002, northing[1] + 0.3, 9.0)], (0, 0, -1)
+    assert wive.Scene.from_heightfield(z, easting, northing).occluded(above, down).all()
+    for options in ({"dtype": np.float32}, {"dtype": "float32", "accuracy": "exact"}):
+        with pytest.raises(ValueError, match=r"^x must differ from column to column in float32"):
+            wive.Scene.from_heightfield(z, easting, northing, **options)
+    rounded = wive.Scene.from_heightfield(z, easting - 743_512, northing - 4_042_318, dtype=np.float32)
+    assert rounded.occluded([(0.012, 1.3, 9)], down).all()

@@ -39,6 +39,14 @@ def test_npy_holds_the_numbers(tmp_path):
         np.testing.assert_array_equal(np.load(tmp_path / name), image)
 
 
+@pytest.mark.parametrize("name", ["a.npy", "a.hdr", "a.png"])
+def test_numbers_beyond_float32_are_infinite_without_a_warning(tmp_path, name):
+    wive.write_picture(tmp_path / name, PICTURE.astype(np.float64) + 1e300)
+    wive.write_picture(tmp_path / "b.npy", PICTURE + np.float32(np.inf))
+    if name == "a.npy":
+        assert (tmp_path / name).read_bytes() == (tmp_path / "b.npy").read_bytes()
+
+
 def test_exr_holds_the_numbers(tmp_path):
     for channel, image in (("RGB", PICTURE), ("Z", DEPTH)):
         pytest.importorskip("OpenEXR")

@@ -351,6 +351,11 @@ def test_bad_options_are_named_as_by_scene(options, message):
         wive.Scene.from_meshes([SPHERE, SPHERE], **options)
 
 
+def test_faces_beside_the_meshes_are_refused():
+    with pytest.raises(TypeError, match="argument 'faces'"):
+        wive.Scene.from_meshes([SPHERE, SPHERE], faces=SPHERE[1])
+
+
 def test_saved_and_pickled_scenes_keep_their_meshes(tmp_path):
     path = tmp_path / "scene.wive"
     given = meshes(np.float64)

@@ -72,6 +72,18 @@ def test_the_function_is_put_back(part: "trimesh.Trimesh") -> None:
     assert trimesh.proximity.closest_point is own
 
 
+def test_a_mesh_without_triangles_is_refused_and_a_point_nowhere_has_no_place(
+    part: "trimesh.Trimesh",
+) -> None:
+    nowhere = [[np.nan, 0, 0]]
+    with wive.trimesh.installed():
+        for query in ("on_surface", "signed_distance"):
+            with pytest.raises(ValueError, match=r"^mesh must have triangles"):
+                getattr(trimesh.Trimesh().nearest, query)([[0, 0, 0]])
+        assert np.isnan(part.nearest.signed_distance(nowhere)).all()
+        assert part.nearest.on_surface(nowhere)[2] == [-1]
+
+
 def test_a_mesh_with_an_intersector_of_its_own_keeps_trimeshs(
     part: "trimesh.Trimesh", monkeypatch: pytest.MonkeyPatch
 ) -> None:

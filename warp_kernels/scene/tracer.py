@@ -11,11 +11,11 @@ import warp as wp
 from numpy.typing import NDArray
 
 from wive import _cpu
-from wive._internal.arguments import Lanes, Work
 from wive._internal.arrays import NUMPY
 from wive._internal.distant import Ball, Moved, moved
 from wive._internal.inside import DIRECTIONS
 from wive._internal.inside_scene import SignOption, closed_scene, inside_of, signed_distances
+from wive._internal.options import Lanes, Work
 from wive._internal.picture import Image, Look
 from wive._internal.points import Points
 from wive._internal.precision import Floats, real_of

@@ -7,9 +7,9 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from wive._internal.arguments import Work
 from wive._internal.host_arrays import host_arrays
 from wive._internal.inside import Mask, contains, is_closed
+from wive._internal.options import Work
 from wive._internal.points import Points
 from wive._internal.precision import Floats, real_of
 from wive._internal.progress import part

@@ -24,7 +24,11 @@ def _replacing(original: Any) -> Any:
     @functools.wraps(original)
     def closest_point(mesh: Any, points: Any) -> Any:
         by_wive = getattr(getattr(mesh, "ray", None), NAME, None)
-        return original(mesh, points) if by_wive is None else by_wive(points)
+        if by_wive is None:
+            return original(mesh, points)
+        if len(mesh.faces) == 0:  # trimesh's own raises as well: its callers take triangle -1 for the last
+            raise ValueError("mesh must have triangles for a point to be closest, got none")
+        return by_wive(points)
 
     closest_point._wive_replaces = original  # type: ignore[attr-defined]
     return closest_point

@@ -8,7 +8,7 @@ from typing import Literal, NamedTuple, TypedDict
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from wive._internal import arguments
+from wive._internal import arguments, options
 
 Image = NDArray[np.float32]
 Shading = Literal["auto", "path", "ao", "headlight", "normals", "depth"]
@@ -73,7 +73,7 @@ class Settings:
         if not (self.reach is None or _is_infinite(self.reach)) and arguments.real("reach", self.reach) <= 0:
             raise ValueError(f"reach must be above 0, got {self.reach:g}")
         arguments.integer("seed", self.seed, 0)
-        arguments.threads(self.threads)
+        options.threads(self.threads)
 
 
 def _is_infinite(value: object) -> bool:

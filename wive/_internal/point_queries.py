@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from wive._internal import arguments
-from wive._internal.arguments import Work
+from wive._internal import arguments, options
 from wive._internal.gradients import warn_of_lost_gradients
 from wive._internal.inside_scene import SIGNS, SignOption
+from wive._internal.options import Work
 from wive._internal.points import Points, check_points
 from wive._internal.precision import Floats
 from wive._internal.progress import ProgressOption, checked_progress, reported
@@ -119,7 +119,7 @@ class PointQueries:
 
 
 def _work(tracer: Tracer, threads: int | None) -> Work:
-    return arguments.work(tracer.backend, tracer.lacks, threads, None, "auto", False)
+    return options.work(tracer.backend, tracer.lacks, threads, None, "auto", False)
 
 
 def _reported(progress: ProgressOption, points: Points, work: Callable[[], Any]) -> Any:

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any, TypeVar, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from wive._internal import arguments
-from wive._internal.arguments import USUAL_WORK, LanesOption, Work
 from wive._internal.arrays import NUMPY
 from wive._internal.gradients import warn_of_lost_gradients
+from wive._internal.options import USUAL_WORK, LanesOption, Work
+from wive._internal.options import work as checked_work
 from wive._internal.precision import Floats
 from wive._internal.progress import ProgressOption, checked_progress, reported
 from wive._internal.rays import NAMES, Rays, check_rays, ray_count
@@ -25,7 +25,7 @@ from wive.hits import Hits, Stats
 if TYPE_CHECKING:
     from typing_extensions import Unpack
 
-    from wive._internal.arguments import Counted, CountedAll, CountedCount, Given, Plain, PlainAll, PlainCount
+    from wive._internal.options import Counted, CountedAll, CountedCount, Given, Plain, PlainAll, PlainCount
 
 Answer = TypeVar("Answer")
 # Queries whose results change smoothly with their rays.
@@ -258,7 +258,7 @@ class Queries:
         >>> seen = scene.visible(observer, hits.points())
         """
         tracer = self._tracer
-        work = arguments.work(tracer.backend, tracer.lacks, threads, None, "auto", False)
+        work = checked_work(tracer.backend, tracer.lacks, threads, None, "auto", False)
         free: NDArray[np.bool_] = reported(
             checked_progress(progress),
             ray_count(a, b),
@@ -327,7 +327,7 @@ class Queries:
             work = USUAL_WORK
         else:
             options = threads, in_flight, lanes, stats, touching, max_bytes
-            work = arguments.work(tracer.backend, tracer.lacks, *options)
+            work = checked_work(tracer.backend, tracer.lacks, *options)
         checked = check_rays(*rays, tracer.backend, tracer.device)
         if checked.library is not NUMPY and query.__name__ in SMOOTH:
             warn_of_lost_gradients(query.__name__, **dict(zip(NAMES, rays, strict=True)))

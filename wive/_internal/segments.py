@@ -12,11 +12,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from wive import _cpu
 from wive._internal import arguments
-from wive._internal.arguments import Work
 from wive._internal.arrays import NUMPY
 from wive._internal.distant import MOST_COORDINATE
 from wive._internal.error_bounds import ROUNDINGS, UNIT_ROUNDOFF
 from wive._internal.host_arrays import host_arrays
+from wive._internal.options import Work
 from wive._internal.precision import FLOAT64, Floats
 from wive._internal.progress import part
 from wive._internal.ray_shapes import flat_ends

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from wive import _cpu
-from wive._internal import arguments
+from wive._internal import arguments, mesh_arguments
 from wive._internal.arrays import NUMPY, library_of
 from wive._internal.formats.placing import affine, placed
 from wive._internal.host_arrays import host_array
@@ -77,7 +77,7 @@ def name_the_mesh(joined: Joined) -> None:
 def moved_rows(geoms: Geoms, i: int, vertices: ArrayLike, real: Real) -> Floats:
     """New positions of mesh `i`; ValueError or TypeError if they aren't as many as before."""
     first, last = geoms.vertices[i : i + 2].tolist()
-    return arguments.moved_vertices(vertices, last - first, real, f"those of mesh {i}")
+    return mesh_arguments.moved_vertices(vertices, last - first, real, f"those of mesh {i}")
 
 
 def refitted_mesh(tracer: Tracer, faces: NDArray[np.int32], geoms: Geoms, i: int, rows: Floats) -> Tracer:
@@ -157,7 +157,7 @@ def _of_nodes(scene: Any) -> Iterator[Given]:
             if hasattr(mesh, "vertices") and not hasattr(mesh, "faces"):
                 yield np.empty((0, 3)), np.empty((0, 3), np.int32), ""
                 continue
-            points, corners = arguments.mesh(*mesh_arrays(mesh), dtype=np.float64)
+            points, corners = mesh_arguments.mesh(*mesh_arrays(mesh), dtype=np.float64)
             world = affine(np.asarray(matrix, np.float64), f"transform of node {shown(node)}")
             mirrored = np.linalg.det(world[:3, :3]) < 0
         except (TypeError, ValueError) as error:
@@ -173,7 +173,7 @@ def _checked(i: int, given: Given, accuracy: str, dtype: DTypeLike | None) -> Me
     """A mesh as the core takes it; its faces index its own vertices."""
     vertices, faces, rounding = given
     try:
-        points, corners = arguments.mesh(vertices, faces, accuracy, dtype, rounding)
+        points, corners = mesh_arguments.mesh(vertices, faces, accuracy, dtype, rounding)
         if corners.size and not 0 <= corners.min() <= corners.max() < len(points):
             _make_alone("", points, corners)
     except (TypeError, ValueError) as error:

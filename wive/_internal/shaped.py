@@ -7,8 +7,8 @@ from typing import Any
 
 from numpy.typing import ArrayLike
 
-from wive._internal.arguments import Work
 from wive._internal.arrays import library_of
+from wive._internal.options import Work
 from wive._internal.precision import Floats
 from wive._internal.ray_shapes import flat_directions, flat_rays
 from wive._internal.rays import Rays

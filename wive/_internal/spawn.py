@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from wive import _cpu
-from wive._internal import arguments
+from wive._internal import arguments, mesh_arguments
 from wive._internal.error_bounds import UNIT_ROUNDOFF
 from wive._internal.host_arrays import host_arrays
 from wive._internal.precision import Floats, real_of
@@ -98,7 +98,7 @@ def spawn_from(
     """`Scene.spawn`: the same from places of the user's, checked; in the library that they came in."""
     (prims, weights, along), library = host_arrays("spawn", prim=prim, uv=uv, directions=directions)
     prims, weights, along, leading = flat_places(prims, weights, along)
-    triangles = arguments.triangles("prim", prims, len(faces))
+    triangles = mesh_arguments.triangles("prim", prims, len(faces))
     real, count = real_of(vertices.dtype, accuracy), len(triangles)
     rows = arguments.per_hit("uv", weights, 2, count, real)
     ways = arguments.per_hit("directions", along, 3, count, real)

@@ -5,10 +5,10 @@ from typing import IO, Any, TypedDict
 import numpy as np
 from numpy.typing import NDArray
 
-from wive._internal.arguments import AccuracyOption, NodesOption, QualityOption
 from wive._internal.files import PathLike, atomic_write, file_name
 from wive._internal.lines import one_line
 from wive._internal.npzfile import Npz, open_npz
+from wive._internal.options import AccuracyOption, NodesOption, QualityOption
 from wive._internal.precision import Floats
 from wive._internal.room import room_for
 from wive.geoms import Geoms

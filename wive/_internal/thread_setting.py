@@ -5,7 +5,7 @@ import os
 from collections.abc import Iterator
 
 from wive import _cpu
-from wive._internal import arguments
+from wive._internal import options
 from wive._internal.process_lock import PROCESS_LOCK
 
 VARIABLE = "WIVE_NUM_THREADS"
@@ -24,7 +24,7 @@ def set_threads(count: int | None) -> None:
     Raises ValueError if count is less than 1, TypeError if it is no integer.
     """
     global _asked
-    asked = arguments.threads(count)
+    asked = options.threads(count)
     with PROCESS_LOCK:
         _asked = asked
         _cpu.set_thread_count(asked)

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Protocol
 
 from wive import _cpu
-from wive._internal.arguments import Work
+from wive._internal.options import Work
 from wive._internal.picture import Image, Look
 from wive._internal.points import Points
 from wive._internal.precision import Floats

@@ -9,8 +9,8 @@ import dask.array as da
 import numpy as np
 from dask.delayed import Delayed
 
-from wive._internal import arguments
-from wive._internal.arguments import LanesOption
+from wive._internal.options import LanesOption
+from wive._internal.options import work as checked_work
 from wive.dask.all_hits import DaskAllHits
 from wive.dask.carried import CarriedScene, carried
 from wive.dask.hits import DaskHits
@@ -129,7 +129,7 @@ class _Query:
         self._name = name
         lacks = scene._tracer.lacks
         touching, most = options.get("touching", False), options.get("max_bytes")
-        arguments.work(scene.backend, lacks, threads, in_flight, lanes, False, touching, most)
+        checked_work(scene.backend, lacks, threads, in_flight, lanes, False, touching, most)
         if threads is None and "threads" not in lacks:
             threads = 1
         self._options = {"threads": threads, "in_flight": in_flight, "lanes": lanes, **options}

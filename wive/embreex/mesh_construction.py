@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from wive._internal import arguments
+from wive._internal import arguments, mesh_arguments
 from wive._internal.precision import FLOAT32, Floats
 from wive.embreex.rtcore_scene import EmbreeScene
 
@@ -41,7 +41,7 @@ class TriangleMesh:
             vertices = _corners(vertices)
             indices = np.arange(len(vertices)).reshape(-1, 3)
         points = arguments.vectors("vertices", vertices, FLOAT32, may_be_one=False)
-        _add(scene, points, arguments.indices("indices", indices, len(points), (3,)))
+        _add(scene, points, mesh_arguments.indices("indices", indices, len(points), (3,)))
 
 
 class ElementMesh(TriangleMesh):
@@ -59,7 +59,7 @@ class ElementMesh(TriangleMesh):
         Raises ValueError or TypeError, in one line naming the argument; nothing is added then.
         """
         points = arguments.vectors("vertices", vertices, FLOAT32, may_be_one=False)
-        corners = arguments.indices("indices", indices, len(points), tuple(TRIANGLES))
+        corners = mesh_arguments.indices("indices", indices, len(points), tuple(TRIANGLES))
         _add(scene, points, corners[:, TRIANGLES[corners.shape[1]]].reshape(-1, 3))
 
 

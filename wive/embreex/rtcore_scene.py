@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from wive._internal import arguments
-from wive._internal.arguments import AccuracyOption
+from wive._internal.options import AccuracyOption
 from wive._internal.precision import FLOAT32, Floats
 from wive.embreex.rtcore import EmbreeDevice
 from wive.scene import Scene

@@ -180,4 +180,5 @@ def _values(image: ArrayLike) -> NDArray[np.float32]:
         raise ValueError(f"image must have shape (h, w, 3) or (h, w), got {array.shape}")
     if array.dtype.kind != "f":
         raise TypeError(f"image must be floats, got dtype {array.dtype}: divide 8-bit values by 255")
-    return np.ascontiguousarray(array, np.float32)
+    with np.errstate(over="ignore"):  # numbers beyond float32 are infinite
+        return np.ascontiguousarray(array, np.float32)
