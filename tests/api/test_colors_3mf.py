@@ -1,4 +1,4 @@
-"""Colours of 3MF files: base materials and colour groups, of objects, triangles and corners."""
+"""Colours of 3MF files: base and composite materials, colour groups; of objects, triangles and corners."""
 
 import io
 import zipfile
@@ -124,6 +124,55 @@ def test_damaged_colours_are_refused_by_one_line(triangle, resources, expected):
     assert expected in str(caught.value)
     assert "\n" not in str(caught.value)
     assert len(wive.load_mesh(file([triangle], resources=resources))[1]) == 1
+
+
+COMPOSITES = (
+    f'{BASES}<m:compositematerials id="4" matid="5" matindices="0 1"><m:composite values="0.25 0.75"/>'
+    '<m:composite values="1"/><m:composite values="0.2 0.2 7"/><m:composite values="0 0"/>'
+    "</m:compositematerials>"
+)
+MIXED = {0: [0.2, 0, 0.6], 1: RED, 2: [0.4, 0, 0.4], 3: [0.4, 0, 0.4]}
+
+
+@pytest.mark.parametrize("member", MIXED)
+def test_composites_mix_the_display_colours_of_their_materials(member):
+    """As spec_materials says, section 4.1: relative to the sum, missing ones are 0, too many don't count."""
+    found = colours([f'pid="4" p1="{member}"', 'pid="5" p1="0"'], resources=COMPOSITES)
+    np.testing.assert_allclose(found[:, 0], [MIXED[member], RED], rtol=1e-6, atol=1e-12)
+
+
+def test_composites_are_of_corners_and_of_objects():
+    found = colours(['pid="4" p1="0" p2="1" p3="2"', ""], 'pid="4" pindex="3"', COMPOSITES)
+    expected = [np.mean([MIXED[0], MIXED[1], MIXED[2]], axis=0), MIXED[3]]
+    np.testing.assert_allclose(found[:, 0], expected, rtol=1e-6, atol=1e-12)
+
+
+@pytest.mark.parametrize("base", ['<base name="a"/>', ""])
+def test_composites_of_materials_without_colours_have_none(base):
+    resources = COMPOSITES.replace('<base name="a" displaycolor="#FF0000"/>', base or "<base/>")
+    if not base:
+        resources = resources.replace('matid="5"', 'matid="55"')
+    found = colours(['pid="4" p1="0"', 'pid="5" p1="1"'], resources=resources)
+    np.testing.assert_allclose(found[:, 0], [NONE, BLUE], rtol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "expected"),
+    [
+        ('matindices="0 1"', 'matindices="0 2"', "group '4': expected an index below 2, found '2'"),
+        ('matindices="0 1"', 'matindices="0 x"', "found 'x'"),
+        ('matindices="0 1"', "", "expected an attribute 'matindices'"),
+        ("0.25 0.75", "0.25 nan", "composite: expected finite numbers, found 'nan'"),
+        ("0.25 0.75", "0.25 -1", "expected proportions from 0 to 1, found '0.25 -1.0'"),
+        ("0.25 0.75", "red", "could not convert string to float"),
+        ('values="0.25 0.75"', "", "expected an attribute 'values'"),
+    ],
+)
+def test_damaged_composites_are_refused_by_one_line(old, new, expected):
+    with pytest.raises(ValueError, match=r"^mesh \(bytes\): ") as caught:
+        colours(['pid="4" p1="0"'], resources=COMPOSITES.replace(old, new, 1))
+    assert expected in str(caught.value)
+    assert "\n" not in str(caught.value)
 
 
 QUARTERS = np.array([[[255, 0, 0], [0, 255, 0]], [[0, 0, 255], [255, 255, 255]]], np.uint8)

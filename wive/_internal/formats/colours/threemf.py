@@ -1,4 +1,4 @@
-"""3MF: display colours of base materials, colours of colour groups, textures."""
+"""3MF: display colours of base materials and of their mixtures, colours of colour groups, textures."""
 
 from __future__ import annotations
 
@@ -51,7 +51,9 @@ class Painter:
             if not group.members:  # a group of another kind, or none
                 continue
             corners = _picked(group, indices, f"{found.place}: group {key!r:.40}")
-            if group.texture is None:
+            if group.mixed is not None:
+                colours[row] = _mixtures(part, group.mixed, corners, f"{found.place}: group {key!r:.40}")
+            elif group.texture is None:
                 colours[row] = linear(np.array(corners), 255)
             else:
                 rows, places = on_textures.setdefault(group.texture, ([], []))
@@ -71,6 +73,32 @@ class Painter:
             return np.full((len(places), 3), np.nan)
         places[..., 1] = 1 - places[..., 1]  # images begin at their top
         return self._means.over(texels, places, texture.wrap)
+
+
+def _mixtures(
+    part: ColouredPart, mixed: tuple[str, tuple[str, ...]], proportions: list[tuple[float, ...]], place: str
+) -> Colours:
+    """(n,3) linear colours of mixtures of base materials; NaN if a material in it has no colour.
+
+    As spec_materials says, section 4.1: proportions are relative to their sum; those left out are 0, those
+    too many don't count, and if all are 0 the materials have equal parts.
+    """
+    key, indices = mixed
+    materials = part.groups.get(key, Group())
+    if not materials.members or materials.texture is not None or materials.mixed is not None:
+        return np.full((len(proportions), 3), np.nan)
+    colours = linear(np.array(_picked(materials, indices, place)).reshape(-1, 3), 255)
+    parts = np.zeros((len(proportions), len(indices)))
+    for row, given in zip(parts, proportions, strict=True):
+        known = given[: len(indices)]
+        if not all(0 <= value <= 1 for value in known):
+            raise ValueError(
+                f"{place}: expected proportions from 0 to 1, found {' '.join(map(str, known))!r:.40}: "
+                "the file is damaged"
+            )
+        row[: len(known)] = known
+        row[:] = row / row.sum() if row.any() else 1 / max(len(row), 1)
+    return np.asarray(np.where(parts[..., None] > 0, parts[..., None] * colours, 0).sum(axis=1))
 
 
 def _picked(group: Group, indices: tuple[str | None, ...], place: str) -> list[tuple[float, ...]]:

@@ -1,6 +1,6 @@
 """Model parts of 3MF with their groups of colours and of places on textures, and what uses them.
 
-https://github.com/3MFConsortium/spec_core, sections 4.1.4 and 5; spec_materials, sections 2 and 6.
+https://github.com/3MFConsortium/spec_core, sections 4.1.4 and 5; spec_materials, chapters 2 to 4 and 6.
 """
 
 from __future__ import annotations
@@ -18,7 +18,12 @@ from wive._internal.formats.xml_events import Attributes
 
 MATERIAL = re.compile(r"http://schemas\.microsoft\.com/3dmanufacturing/material/\d+/\d+ (\w+)")
 # Elements of groups, and those of their members.
-GROUPS = {"basematerials": "base", "colorgroup": "color", "texture2dgroup": "tex2coord"}
+GROUPS = {
+    "basematerials": "base",
+    "colorgroup": "color",
+    "texture2dgroup": "tex2coord",
+    "compositematerials": "composite",
+}
 COLOUR = re.compile(r"#([0-9a-fA-F]{6})(?:[0-9a-fA-F]{2})?")
 WRAPS = {"wrap": REPEAT, "mirror": MIRROR, "clamp": CLAMP, "none": CLAMP}
 NONE = (np.nan,) * 3
@@ -36,9 +41,12 @@ class Texture:
 
 @dataclass
 class Group:
-    """Colours from 0 to 255, or places on a texture from its left and bottom, if it has the texture's id."""
+    """Colours from 0 to 255; places on a texture from its left and bottom, if it has the texture's id; or the
+    proportions of base materials, if it has the group of these and which of its members they are.
+    """
 
     texture: str | None = None
+    mixed: tuple[str, tuple[str, ...]] | None = None
     members: list[tuple[float, ...]] = field(default_factory=list)
 
 
@@ -91,7 +99,11 @@ class ColouredPart(Part):
                 self._surface = self._surfaces[id(self._object)] = Surface(attributes)
             elif name in GROUPS:
                 (key,) = self._values(attributes, "id")
-                self._group = self.groups.setdefault(key, Group(attributes.get("texid")))
+                mixed = None
+                if name == "compositematerials":
+                    base, materials = self._values(attributes, "matid", "matindices")
+                    mixed = base, tuple(materials.split())
+                self._group = self.groups.setdefault(key, Group(attributes.get("texid"), mixed))
             elif name == "texture2d":
                 key, path = self._values(attributes, "id", "path")
                 styles = [attributes.get(key, "wrap") for key in ("tilestyleu", "tilestylev")]
@@ -107,6 +119,9 @@ class ColouredPart(Part):
         return surface
 
     def _member(self, name: str, attributes: Attributes) -> tuple[float, ...]:
+        if name == "composite":
+            here = f"line {self.line()}: {name}"
+            return tuple(finite(self._values(attributes, "values")[0].split(), here).tolist())
         if name == "tex2coord":
             here = f"line {self.line()}: {name}"
             u, v = finite(self._values(attributes, "u", "v"), here).tolist()
