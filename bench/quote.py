@@ -251,18 +251,11 @@ def pareto_scenes(content: report.Row) -> str:
     return markdown(["contender", *heads], lines)
 
 
-def dask_speed(content: report.Row) -> str:
-    """Speed of wive.dask over one call of the scene, and Mray/s."""
-    lines = [
-        [
-            row["contender"],
-            f"{row['speed']:.2f}",
-            f"{row['low']:.2f} to {row['high']:.2f}",
-            f"{row['mrays']:.1f}",
-        ]
-        for row in content["rows"]
-    ]
-    return markdown(["two cores", "speed", "quartiles", "Mray/s"], lines)
+def listed(part: str, columns: dict[str, str], texts: int = 1) -> Table:
+    """A line per row of a part of the results; columns are titles and what of the row they have."""
+    return lambda content: markdown(
+        list(columns), [[cell.format(**row) for cell in columns.values()] for row in content[part]], texts
+    )
 
 
 def peers_means(content: report.Row) -> str:
@@ -279,15 +272,6 @@ def peers_means(content: report.Row) -> str:
     return markdown(["peer", "its builder", "rays", *heads], lines, texts=3)
 
 
-def peers_builds(content: report.Row) -> str:
-    """Building by other libraries: their seconds over wive's."""
-    lines = [
-        [row["scene"], f"{row['triangles']:,}", row["peer"], f"{row['usual']:.2f}", f"{row['high']:.2f}"]
-        for row in content["builds"]
-    ]
-    return markdown(["scene", "triangles", "peer", "usual / medium", "high / high"], lines)
-
-
 TABLES: dict[str, Table] = {
     "embree.avx512_in_flight": embree_speed("avx512", "tuned"),
     "embree.avx512_one_ray": embree_speed("avx512", 1),
@@ -302,9 +286,24 @@ TABLES: dict[str, Table] = {
     "inflight.best": inflight_best,
     "order.means": order_means,
     "order.scenes": order_scenes,
-    "dask.speed": dask_speed,
+    "dask.speed": listed("rows", {
+        "two cores": "{contender}", "speed": "{speed:.2f}", "quartiles": "{low:.2f} to {high:.2f}",
+        "Mray/s": "{mrays:.1f}",
+    }),
+    "closest.points": listed("rows", {
+        "scene": "{scene}", "points": "{kind}", "triangles": "{triangles:,}",
+        "wive, ns per point": "{wive_ns:.0f}", "Open3D": "{open3d:.1f}", "trimesh": "{trimesh:.0f}",
+    }, texts=2),
+    "spawn.parts": listed("rows", {
+        "scene": "{scene}", "precision": "{precision}", "closest hits, ns per ray": "{intersect_ns:.0f}",
+        "spawn": "{spawn:.2f}", "points": "{points:.2f}", "normals": "{normals:.2f}",
+        "error_bound": "{error_bound:.2f}", "spawn, of any hits": "{of_occluded:.2f}",
+    }, texts=2),
     "peers.means": peers_means,
-    "peers.builds": peers_builds,
+    "peers.builds": listed("builds", {
+        "scene": "{scene}", "triangles": "{triangles:,}", "peer": "{peer}", "usual / medium": "{usual:.2f}",
+        "high / high": "{high:.2f}",
+    }),
     "pareto.means": pareto_means,
     "pareto.scenes": pareto_scenes,
-}
+}  # fmt: skip

@@ -70,6 +70,26 @@ def test_bench_closest_compares_points_and_insides(bench: Callable[..., dict[str
     assert content["contains"][0]["contains"] > 0
 
 
+def test_a_library_that_lacks_a_package_has_no_column_and_a_line_says_why(monkeypatch, capsys) -> None:
+    pytest.importorskip("rtree")
+    from bench import closest
+
+    for missing in ("open3d", "rtree"):
+        monkeypatch.setitem(sys.modules, missing, None)
+    assert closest.usable() == {}
+    lines = capsys.readouterr().err.splitlines()
+    assert [line.partition(": ")[2].partition(": ")[0] for line in lines] == [
+        "no column open3d", "no column trimesh",
+    ]  # fmt: skip
+    assert "open3d" in lines[0] and "trimesh" in lines[1]
+
+
+def test_bench_spawn_compares_with_the_trace(bench: Callable[..., dict[str, Any]]) -> None:
+    rows = bench("spawn", "--scenes", SCENE)["rows"]
+    assert [row["precision"] for row in rows] == ["float32", "float64"]
+    assert min(row[part] for row in rows for part in ("spawn", "points", "normals", "error_bound")) > 0
+
+
 def test_bench_moving_times_every_way(bench: Callable[..., dict[str, Any]]) -> None:
     (row,) = bench("moving", "--scenes", SCENE)["rows"]
     assert row["moving"] > 100
