@@ -11,7 +11,7 @@ import wive
 from wive import _cpu
 from wive._internal import moving_part
 
-RAYS = random_rays(3000, seed=3)
+RAYS = random_rays(1000, seed=3)
 needs_the_lock = pytest.mark.skipif(
     not moving_part._counts_references(), reason="without an interpreter lock no mesh moves in place"
 )
@@ -62,12 +62,12 @@ def test_a_mesh_that_moves_is_where_a_new_scene_has_it(moves, backend, accuracy,
     given, options = meshes(dtype), {"backend": backend, "accuracy": accuracy}
     scene = wive.Scene.from_meshes(given, **options)
     random = np.random.default_rng(5)
-    for step in range(20):
+    for step in range(3 if backend == "warp" else 20):  # Warp's trees are made anew
         i = int(random.integers(len(given)))
         scale, shift = random.uniform(0.5, 1.5), random.normal(size=3) * 2.0 ** random.integers(-3, 4)
         given[i] = (given[i][0] * dtype(scale) + shift.astype(dtype)).astype(dtype), given[i][1]
         scene.refit(given[i][0], geom=i)
-        if step % 4 == 3:
+        if step in (2, 9):
             assert_as_new(scene, given, **options)
     assert_as_new(scene, given, **options)
     in_place = backend != "warp" and moving_part._counts_references()
@@ -138,7 +138,7 @@ def test_queries_in_other_threads_see_the_old_positions_or_the_new_ones():
     plate = ground[0] * np.float32(0.5), ground[1]
     scene = wive.Scene.from_meshes([soup(3000, seed=9), ground, plate])
     scene.refit(soup(3000, seed=9)[0] + 50, geom=0)
-    origins = np.tile(np.float32([1, 2, 100]), (50_000, 1))
+    origins = np.tile(np.float32([1, 2, 100]), (20_000, 1))
     seen, stop = set(), threading.Event()
 
     def look() -> None:
@@ -150,7 +150,7 @@ def test_queries_in_other_threads_see_the_old_positions_or_the_new_ones():
     watchers = [threading.Thread(target=look) for _ in range(2)]
     for watcher in watchers:
         watcher.start()
-    for step in range(200):
+    for step in range(100):
         scene.refit(plate[0] + np.float32([0, 0, 1 + step % 2]), geom=2)
     stop.set()
     for watcher in watchers:
