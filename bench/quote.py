@@ -171,19 +171,6 @@ def paper_gains(content: report.Row) -> str:
     return markdown(["scene", *(title for title, _ in heads)], lines)
 
 
-def python_means(content: report.Row) -> str:
-    """Speed of wive from Python over each rival, per number of threads."""
-    lines = [
-        [
-            *(row[key] for key in ("query", "other", "ours", "threads")),
-            f"{row['mean']:.1f}",
-            f"{row['lowest']:.1f} ({row['lowest_at']})",
-        ]
-        for row in content["means"]
-    ]
-    return markdown(["query", "other", "ours", "threads", "geometric mean", "lowest"], lines, 3)
-
-
 def python_single(content: report.Row) -> str:
     """Microseconds per call for one ray, the median over scenes."""
     lines = []
@@ -191,20 +178,6 @@ def python_single(content: report.Row) -> str:
         times = sorted(row["p50_us"] for row in where(content["single"], query=query, caller=caller))
         lines.append([query, caller, f"{times[len(times) // 2]:.1f}"])
     return markdown(["query", "caller", "microseconds per call"], lines, 2)
-
-
-def inflight_best(content: report.Row) -> str:
-    """The best number of rays in flight, and the default's speed."""
-    lines = [
-        [
-            *(row["scene"], row["rays"], f"{row['triangles']:,}", f"{row['tree_mib']:.1f}", row["best"]),
-            *(f"{row['speedup']:.2f}", f"{row['tuned']:.2f}", f"{row['mrays']:.1f}"),
-            f"{row['latency_ns']:.0f}",
-        ]
-        for row in content["best"]
-    ]
-    heads = ["triangles", "tree, MiB", "best K", "speed over K = 1", "default's", "Mray/s", "latency, ns"]
-    return markdown(["scene", "rays", *heads], lines, 2)
 
 
 def order_means(content: report.Row) -> str:
@@ -281,9 +254,16 @@ TABLES: dict[str, Table] = {
     "embree.build": embree_build,
     "build.growth": build_growth,
     "paper.gains": paper_gains,
-    "python.means": python_means,
+    "python.means": listed("means", {
+        "query": "{query}", "other": "{other}", "ours": "{ours}", "threads": "{threads}",
+        "geometric mean": "{mean:.1f}", "lowest": "{lowest:.1f} ({lowest_at})",
+    }, texts=3),
     "python.single": python_single,
-    "inflight.best": inflight_best,
+    "inflight.best": listed("best", {
+        "scene": "{scene}", "rays": "{rays}", "triangles": "{triangles:,}", "tree, MiB": "{tree_mib:.1f}",
+        "best K": "{best}", "speed over K = 1": "{speedup:.2f}", "default's": "{tuned:.2f}",
+        "Mray/s": "{mrays:.1f}", "latency, ns": "{latency_ns:.0f}",
+    }, texts=2),
     "order.means": order_means,
     "order.scenes": order_scenes,
     "dask.speed": listed("rows", {
