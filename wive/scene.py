@@ -21,10 +21,11 @@ from wive._internal.mesh_objects import MeshObject, PlacedMeshes, mesh_arrays
 from wive._internal.moving_part import move_in_place
 from wive._internal.options import AccuracyOption, NodesOption, QualityOption
 from wive._internal.point_queries import PointQueries
-from wive._internal.precision import Floats, Precision, real_of
+from wive._internal.precision import Floats, real_of
 from wive._internal.process_lock import PROCESS_LOCK
 from wive._internal.progress import ProgressOption, checked_progress, reported
 from wive._internal.queries import Queries
+from wive._internal.scene_facts import SceneFacts
 from wive._internal.several_meshes import Joined, Pair, join, moved_rows, name_the_mesh, refitted_mesh
 from wive._internal.storage import (
     FORMAT_VERSION,
@@ -38,14 +39,14 @@ from wive._internal.storage import (
 from wive._internal.stored_scenes import save_file, share, source_of
 from wive._internal.tracer import Tracer
 from wive.backend import resolve_backend
-from wive.geoms import Geoms, one_geom
+from wive.geoms import Geoms
 from wive.meshfile import MeshSource, load_mesh
 
 if TYPE_CHECKING:
-    from wive.warp_kernels import Tree
+    pass
 
 
-class Scene(Queries, PointQueries):
+class Scene(Queries, PointQueries, SceneFacts):
     """A triangle mesh that answers queries of rays and points.
 
     Several threads may query it at once, and so may processes forked from this one. Only `refit` changes it,
@@ -296,80 +297,6 @@ class Scene(Queries, PointQueries):
             shared = tracer_of(bvh, faces, tracer.backend, tracer.device, tracer.geoms)
             self._take(shared, faces, instead_of=tracer)
 
-    @property
-    def vertices(self) -> Floats:
-        """(v,3) float32 or float64 as `precision` says, read-only."""
-        return self._bvh.vertices
-
-    @property
-    def faces(self) -> NDArray[np.int32]:
-        """(f,3) int32, read-only."""
-        return self._faces
-
-    @property
-    def geoms(self) -> Geoms:
-        """The meshes of `from_meshes`: the first row of each in `faces` and `vertices`; else one mesh."""
-        return self._tracer.geoms or one_geom(len(self._faces), len(self.vertices))
-
-    @property
-    def bounds(self) -> Floats:
-        """(2,3) lowest and highest corner of the triangles that can be hit; inf, -inf if there are none.
-
-        float32 or float64 as `precision` says.
-        """
-        return self._bvh.bounds
-
-    @property
-    def memory(self) -> int:
-        """Bytes of the tree: nodes and leaves."""
-        return self._bvh.memory
-
-    @property
-    def backend(self) -> str:
-        """The backend that traces: never "auto"."""
-        return self._tracer.backend
-
-    @property
-    def device(self) -> str | None:
-        """The Warp device that traces, such as "cuda:0"; None for CPU backends."""
-        return self._tracer.device
-
-    @property
-    def tree(self) -> Tree:
-        """The tree on the scene's Warp device, for `wive.warp_kernels`; ValueError for CPU backends."""
-        return self._tracer.tree
-
-    @property
-    def accuracy(self) -> str:
-        """ "watertight", "fast" or "exact"."""
-        return self._bvh.accuracy
-
-    @property
-    def precision(self) -> Precision:
-        """ "float32" or "float64": the dtype of vertices, rays, bounds, t and uv."""
-        return self._real.name
-
-    @property
-    def nodes(self) -> str:
-        """ "float32" or "compressed"."""
-        return self._bvh.node_form
-
-    def __len__(self) -> int:
-        """Number of triangles."""
-        return len(self._faces)
-
-    def __repr__(self) -> str:
-        """Size and options, and where the tree is stored if it is."""
-        device = "" if self.device is None else f", device={self.device!r}"
-        options = (
-            f"backend={self.backend!r}{device}, accuracy={self.accuracy!r}, precision={self.precision!r}"
-        )
-        geoms = self._tracer.geoms
-        several = "" if geoms is None else f" in {len(geoms)} meshes"
-        source = self._bvh.source
-        stored = "" if source is None else f", {source.place.described}"
-        return f"Scene({len(self)} triangles{several}, {options}{stored})"
-
     def _repr_html_(self) -> str:
         """What notebooks show: a small picture, if there is Pillow, and the scene's numbers."""
         from wive._internal.pictures.summary import summary
@@ -413,10 +340,6 @@ class Scene(Queries, PointQueries):
         scene = object.__new__(type(self))
         vars(scene).update(vars(self))
         return scene
-
-    @property
-    def _bvh(self) -> _cpu.Bvh:
-        return self._tracer.bvh
 
 
 def expect_scene(value: object) -> None:
