@@ -231,6 +231,18 @@ def listed(part: str, columns: dict[str, str], texts: int = 1) -> Table:
     )
 
 
+def stream_speed(content: report.Row) -> str:
+    """Speed of streams over one batch in memory, and the share of their CPU time that it would take."""
+    scenes = [scene for (scene,) in distinct(content["rows"], "scene")]
+    lines = []
+    for (form,) in distinct(content["rows"], "form"):
+        rows = [where(content["rows"], scene=scene, form=form)[0] for scene in scenes]
+        lines.append(
+            [form, *(f"{row['ratio']:.2f}" for row in rows), *(f"{row['work']:.2f}" for row in rows)]
+        )
+    return markdown(["form", *(f"{kind}, {scene}" for kind in ("speed", "work") for scene in scenes)], lines)
+
+
 def peers_means(content: report.Row) -> str:
     """Speed over other libraries' trees: geometric mean over the scenes, and lowest."""
     ways = ("watertight", "fast", "one_ray")
@@ -279,6 +291,7 @@ TABLES: dict[str, Table] = {
         "spawn": "{spawn:.2f}", "points": "{points:.2f}", "normals": "{normals:.2f}",
         "error_bound": "{error_bound:.2f}", "spawn, of any hits": "{of_occluded:.2f}",
     }, texts=2),
+    "stream.speed": stream_speed,
     "peers.means": peers_means,
     "peers.builds": listed("builds", {
         "scene": "{scene}", "triangles": "{triangles:,}", "peer": "{peer}", "usual / medium": "{usual:.2f}",

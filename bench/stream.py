@@ -3,14 +3,17 @@
 Above 1 the stream is faster. "read" is `wive.stream` of an .npy file, the others are `wive.trace` of a file
 to a file, which ends when the output is on the disk; "all" is every hit, of a quarter of the rays; "one
 thread" traces on one thread on both sides. In memory, arrays of rays are there before and hits stay there.
-Files are read from the page cache. What is written is deleted after each round.
+`work` is the same ratio of CPU seconds, on which other programs have less influence. Files are read from the
+page cache. What is written is deleted after each round.
 """
 
 import argparse
 import shutil
 import tempfile
+import time
 from collections.abc import Sequence
 from pathlib import Path
+from statistics import median
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -24,7 +27,7 @@ from bench.support.timing import QUICK, Effort, compare, wall_timed
 
 USUAL = ("terrain_jacksboro", "city_san_francisco")
 QUICK_SCENES = ("terrain_2k",)
-COLUMNS = ["scene", "triangles", "form", "mrays", "ratio", "low", "high"]
+COLUMNS = ["scene", "triangles", "form", "mrays", "ratio", "low", "high", "work"]
 Query = Literal["intersect", "intersect_all"]
 RAYS, QUICK_RAYS = 1 << 23, 20_000
 
@@ -93,14 +96,23 @@ def row_of(
         output = f"{folder}/{form.output}"
         wive.trace(scene, folder / form.rays, output, query=form.query, threads=form.threads)
 
+    work: dict[str, list[float]] = {"stream": [], "batch": []}  # seconds of CPU time
+
     def streamed() -> float:
+        begin = time.process_time()
         seconds = wall_timed(stream)()
+        work["stream"].append(time.process_time() - begin)
         if form.output:
             made = folder / form.output
             shutil.rmtree(made) if made.is_dir() else made.unlink()
         return seconds
 
-    batch = wall_timed(lambda: getattr(scene, form.query)(*rays, threads=form.threads))
+    def batch() -> float:
+        begin = time.process_time()
+        seconds = wall_timed(lambda: getattr(scene, form.query)(*rays, threads=form.threads))()
+        work["batch"].append(time.process_time() - begin)
+        return seconds
+
     found = compare(streamed, batch, effort)
     return {
         "scene": name,
@@ -108,6 +120,7 @@ def row_of(
         "form": form.name,
         "mrays": len(rays[0]) / found.our_seconds / 1e6,
         "ratio": found.ratio,
+        "work": median(work["batch"]) / median(work["stream"]),
         "low": found.low,
         "high": found.high,
     }

@@ -11,7 +11,9 @@ FORMS = {
     "npy to npz": "hits to .npz",
     "npz to npz": "rays of .npz, hits to .npz",
     "npy to folder": "hits to a folder of .npy",
+    "npy to npz, one thread": "hits to .npz, traced on one thread",
     "all, npy to npz": "every hit to .npz",
+    "all, npy to folder": "every hit to a folder of .npy",
 }
 
 

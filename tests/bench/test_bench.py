@@ -98,7 +98,7 @@ def test_bench_moving_times_every_way(bench: Callable[..., dict[str, Any]]) -> N
 
 def test_bench_stream_compares_every_form_of_files(bench: Callable[..., dict[str, Any]]) -> None:
     content = bench("stream", "--scenes", SCENE)
-    assert len({row["form"] for row in content["rows"]}) == 5
+    assert len({row["form"] for row in content["rows"]}) == 7
     assert all(row["ratio"] > 0 for row in content["rows"])
 
 
