@@ -1,12 +1,14 @@
 """Closest points and insides, one core: wive against Open3D and trimesh, with the same points.
 
 Points lie evenly in the scene's box ("volume"), or a hundredth of its size off the surface ("surface").
-`open3d` and `trimesh` are their seconds over wive's, from NumPy arrays to NumPy arrays; a library that is not
-installed, or that can't be imported, has no column. trimesh gets a thousandth of the points. `contains` is
-trimesh's `mesh.contains` by embreex over `scene.contains`, for a closed mesh made of the scene's size.
+`open3d` and `trimesh` are their seconds over wive's, from NumPy arrays to NumPy arrays. The cells of a
+library that can't be imported, or that lacks a package, are empty, and a line on standard error says why.
+trimesh gets a thousandth of the points. `contains` is trimesh's `mesh.contains` by embreex over
+`scene.contains`, for a closed mesh.
 """
 
 import argparse
+import sys
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -22,7 +24,9 @@ USUAL = ("living_room", "city_san_francisco", "terrain_jacksboro", "bmw_m6")
 QUICK_SCENES = ("terrain_2k",)
 KINDS = ("volume", "surface")
 OFF_SURFACE = 0.01  # of the scene's size
-COLUMNS = ["scene", "triangles", "kind", "wive_ns", "open3d", "trimesh"]
+Query = Callable[[], Any]
+LIBRARIES = ("open3d", "trimesh")
+COLUMNS = ["scene", "triangles", "kind", "wive_ns", *LIBRARIES]
 CONTAINS = ["triangles", "points", "wive_seconds", "contains"]
 
 
@@ -33,11 +37,12 @@ def main(options: Sequence[str]) -> None:
     effort = QUICK if chosen.quick else Effort(least=3, most=5)
     count = 2_000 if chosen.quick else 50_000
     rows: list[report.Row] = []
+    others = usable()
     with one_core():
         for name in scenes.names:
             mesh = SceneFolder(chosen.scene_dir).load(name)
             for kind in KINDS:
-                rows.append(row_of(name, mesh.vertices, mesh.faces, kind, count, effort))
+                rows.append(row_of(name, mesh.vertices, mesh.faces, kind, count, effort, others))
                 report.print_progress(rows[-1], COLUMNS)
         insides = [inside_row(3 if chosen.quick else 6, 20 * count, effort)]
     report.print_table(rows, COLUMNS, "Closest points, one core: their seconds over wive's")
@@ -49,8 +54,27 @@ def main(options: Sequence[str]) -> None:
     report.save("closest", content, chosen.out, whole=whole)
 
 
+def usable() -> dict[str, Callable[..., Query]]:
+    """What asks each other library, by its name; standard error says what the others need."""
+    found: dict[str, Callable[..., Query]] = {}
+    for name, make in zip(LIBRARIES, (open3d_query, trimesh_query), strict=True):
+        try:
+            make(np.eye(3, dtype=np.float32), np.array([[0, 1, 2]]), np.ones((1, 3), np.float32))()
+        except (ImportError, OSError) as error:
+            print(f"bench closest: no column {name}: {error}", file=sys.stderr)
+        else:
+            found[name] = make
+    return found
+
+
 def row_of(
-    name: str, vertices: np.ndarray, faces: np.ndarray, kind: str, count: int, effort: Effort
+    name: str,
+    vertices: np.ndarray,
+    faces: np.ndarray,
+    kind: str,
+    count: int,
+    effort: Effort,
+    others: dict[str, Callable[..., Query]],
 ) -> report.Row:
     """One scene and kind of points."""
     points = points_of(vertices, faces, kind, count)
@@ -61,10 +85,10 @@ def row_of(
 
     alone = min(ours(points)() for _ in range(3))
     row: report.Row = {"scene": name, "triangles": len(faces), "kind": kind, "wive_ns": alone / count * 1e9}
-    few = points[:: max(1, count // 50)]
-    for library, make, some in (("open3d", open3d_query, points), ("trimesh", trimesh_query, few)):
-        theirs = make(vertices, faces, some)
-        row[library] = None if theirs is None else compare(ours(some), timed(theirs), effort).ratio
+    row |= dict.fromkeys(LIBRARIES)
+    for library, make in others.items():
+        some = points[:: max(1, count // 50)] if library == "trimesh" else points
+        row[library] = compare(ours(some), timed(make(vertices, faces, some)), effort).ratio
     return row
 
 
@@ -79,28 +103,23 @@ def points_of(vertices: np.ndarray, faces: np.ndarray, kind: str, count: int) ->
     return (places + OFF_SURFACE * (high - low).max() * random.standard_normal((count, 3))).astype(np.float32)
 
 
-def open3d_query(vertices: np.ndarray, faces: np.ndarray, points: np.ndarray) -> Callable[[], Any] | None:
-    """Open3D's closest points on one thread; None without Open3D."""
-    try:
-        import open3d
-    except (ImportError, OSError):
-        return None
+def open3d_query(vertices: np.ndarray, faces: np.ndarray, points: np.ndarray) -> Query:
+    """Open3D's closest points on one thread."""
+    import open3d
+
     tensor = open3d.core.Tensor
     scene = open3d.t.geometry.RaycastingScene(nthreads=1)
     scene.add_triangles(tensor(vertices.astype(np.float32)), tensor(faces.astype(np.uint32)))
     return lambda: scene.compute_closest_points(tensor(points), nthreads=1)["points"].numpy()
 
 
-def trimesh_query(vertices: np.ndarray, faces: np.ndarray, points: np.ndarray) -> Callable[[], Any] | None:
-    """trimesh's closest points; None without trimesh or the tree that it needs."""
-    try:
-        import trimesh
+def trimesh_query(vertices: np.ndarray, faces: np.ndarray, points: np.ndarray) -> Query:
+    """trimesh's closest points, whose tree is made."""
+    import trimesh
 
-        mesh = trimesh.Trimesh(vertices, faces, process=False)
-        query: Callable[..., Any] = trimesh.proximity.closest_point
-        query(mesh, points[:1])  # makes the tree
-    except ImportError:
-        return None
+    mesh = trimesh.Trimesh(vertices, faces, process=False)
+    query: Callable[..., Any] = trimesh.proximity.closest_point
+    query(mesh, points[:1])  # makes the tree
     return lambda: query(mesh, points)
 
 

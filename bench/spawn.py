@@ -8,7 +8,6 @@ of `scene.occluded`.
 
 from collections.abc import Callable, Sequence
 
-import matplotlib
 import numpy as np
 
 import wive
@@ -18,10 +17,6 @@ from bench.support.rays import camera_rays
 from bench.support.scenes import Mesh, SceneFolder
 from bench.support.timing import QUICK, Effort, compare_in_turn, one_core, timed
 from wive._internal.precision import Floats
-
-matplotlib.use("Agg")
-from matplotlib import pyplot
-from matplotlib.figure import Figure
 
 USUAL = ("living_room", "city_san_francisco", "terrain_jacksboro", "bmw_m6")
 QUICK_SCENES = ("terrain_2k",)
@@ -42,7 +37,7 @@ def main(options: Sequence[str]) -> None:
                 rows.append(row_of(folder.load(name), dtype, chosen.quick))
                 report.print_progress(rows[-1], COLUMNS)
     report.print_table(rows, COLUMNS, "What follows a trace, one core: parts of its seconds")
-    report.save("spawn", {"rows": rows}, draw(rows), chosen.out, whole=scenes.whole and not chosen.quick)
+    report.save("spawn", {"rows": rows}, chosen.out, whole=scenes.whole and not chosen.quick)
 
 
 def row_of(mesh: Mesh, dtype: type, quick: bool) -> report.Row:
@@ -79,16 +74,3 @@ def row_of(mesh: Mesh, dtype: type, quick: bool) -> report.Row:
         **{name: 1 / part.ratio for name, part in zip(PARTS, parts, strict=True)},
         "of_occluded": occluded.ratio / parts[0].ratio,
     }
-
-
-def draw(rows: Sequence[report.Row]) -> Figure:
-    """Parts of the trace's seconds by scene and precision."""
-    figure, axes = pyplot.subplots(figsize=(8, 4), layout="constrained")
-    labels = [f"{row['scene']}\n{row['precision']}" for row in rows]
-    for i, name in enumerate(PARTS):
-        axes.bar(np.arange(len(rows)) + 0.2 * (i - 1.5), [row[name] for row in rows], 0.19, label=name)
-    axes.set_xticks(range(len(rows)), labels, fontsize=7)
-    axes.set_ylabel("seconds over those of the trace")
-    axes.spines[["top", "right"]].set_visible(False)
-    axes.legend(frameon=False)
-    return figure

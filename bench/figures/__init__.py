@@ -10,7 +10,7 @@ if TYPE_CHECKING:
 
 DRAWN = (
     "build", "cliffs", "closest", "dask", "embree", "inflight", "latency", "moving", "order", "packets",
-    "paper", "pareto", "peers", "python", "stream",
+    "paper", "pareto", "peers", "python", "spawn", "stream",
 )  # fmt: skip
 
 
