@@ -10,6 +10,7 @@ from wive import _cpu
 from wive._internal.files import PathLike, file_name
 from wive._internal.lines import one_line
 from wive._internal.npzfile import check_input
+from wive._internal.options import threads as checked_threads
 from wive._internal.precision import real_asked
 from wive._internal.progress import ProgressOption, checked_progress
 from wive._internal.several_meshes import Joined
@@ -57,6 +58,8 @@ def is_saved_file(path: PathLike) -> bool:
 def from_saved(cls: type[Scene], path: PathLike, dtype: DTypeLike | None, given: dict[str, Any]) -> Scene:
     """The saved scene, or one over its mesh if options are given that its tree doesn't have."""
     progress = checked_progress(given.pop("progress", None))
+    threads = given.pop("threads", None)
+    checked_threads(threads)
     saved = _loaded(cls, path, given.get("backend"), given.get("device"), progress)
     has: dict[str, Any] = {
         "accuracy": saved.accuracy,
@@ -69,7 +72,7 @@ def from_saved(cls: type[Scene], path: PathLike, dtype: DTypeLike | None, given:
         return saved
     saved._bvh.verify()
     mesh = Joined(saved.vertices, saved.faces, saved._tracer.geoms)
-    return cls(mesh, **{**saved._options, "dtype": dtype, **given}, progress=progress)
+    return cls(mesh, **{**saved._options, "dtype": dtype, **given}, threads=threads, progress=progress)
 
 
 def reopened(place: tuple[Any, ...], backend: str, device: str | None) -> Scene:

@@ -20,6 +20,7 @@ from wive._internal.known_meshes import know_again, make_known
 from wive._internal.mesh_objects import MeshObject, PlacedMeshes, mesh_arrays
 from wive._internal.moving_part import move_in_place
 from wive._internal.options import AccuracyOption, NodesOption, QualityOption
+from wive._internal.options import threads as checked_threads
 from wive._internal.point_queries import PointQueries
 from wive._internal.precision import Floats, real_of
 from wive._internal.process_lock import PROCESS_LOCK
@@ -64,6 +65,7 @@ class Scene(Queries, PointQueries, SceneFacts):
         accuracy: AccuracyOption = "watertight",
         nodes: NodesOption = "float32",
         quality: QualityOption = "medium",
+        threads: int | None = None,
         progress: ProgressOption = None,
     ) -> None:
         """Build the tree.
@@ -87,6 +89,7 @@ class Scene(Queries, PointQueries, SceneFacts):
             nodes: "float32", or "compressed": the same hits, under two thirds the bytes, for large trees.
             quality: "medium", or "high" for a tree that takes about four times as long to build and gives the
                 same hits in fewer steps: a sixth fewer if triangle sizes differ much, none in even meshes.
+            threads: how many build the tree, for every backend; None is every core. Scenes don't keep it.
             progress: True shows a bar, if there is tqdm; or a callable that is called as
                 progress(done, total) with numbers of triangles: by the calling thread, some ten times a
                 second at most, `done` never falling, at last once with done == total. An exception of it
@@ -101,6 +104,7 @@ class Scene(Queries, PointQueries, SceneFacts):
         arguments.choice("accuracy", accuracy, ("fast", "watertight", "exact"))
         arguments.choice("nodes", nodes, ("float32", "compressed"))
         arguments.choice("quality", quality, ("medium", "high"))
+        builders = checked_threads(threads)
         self._options = Options(
             backend=backend, device=device, accuracy=accuracy, nodes=nodes, quality=quality
         )
@@ -118,7 +122,7 @@ class Scene(Queries, PointQueries, SceneFacts):
             len(faces),
             "triangle",
             "building",
-            lambda: _cpu.Bvh(points, faces, accuracy, nodes=nodes, quality=quality),
+            lambda: _cpu.Bvh(points, faces, accuracy, nodes=nodes, quality=quality, threads=builders),
         )
         self._take(tracer_of(bvh, faces, found, place, geoms), faces)
 
@@ -219,7 +223,14 @@ class Scene(Queries, PointQueries, SceneFacts):
         scene._take(tracer, faces)
         return scene
 
-    def refit(self, vertices: ArrayLike, *, geom: int | None = None, progress: ProgressOption = None) -> None:
+    def refit(
+        self,
+        vertices: ArrayLike,
+        *,
+        geom: int | None = None,
+        threads: int | None = None,
+        progress: ProgressOption = None,
+    ) -> None:
         """Move the vertices: new positions, the same faces.
 
         The tree keeps its shape and gets new boxes, in a sixth of the time that building takes. Hits are
@@ -240,21 +251,22 @@ class Scene(Queries, PointQueries, SceneFacts):
             geom: the number of a mesh of `from_meshes`: `vertices` are its vertices alone, and are copied,
                 all others stay. On CPU backends, from the second time on, this takes about that mesh's share
                 of a refit of all, if no query runs meanwhile and no copy of the scene uses its tree.
-            progress: as for `Scene`.
+            threads, progress: as for `Scene`.
 
         Raises ValueError or TypeError as construction does, and leaves the scene as it was.
         """
+        count = checked_threads(threads)
         given = host_array("vertices", vertices)
 
         def refitted() -> Tracer | None:
             if geom is None:
                 points = mesh_arguments.moved_vertices(given, len(self.vertices), self._real)
-                return self._tracer.refitted(arguments.read_only(points))
+                return self._tracer.refitted(arguments.read_only(points), count)
             i = arguments.integer("geom", geom, 0, len(self.geoms) - 1)
             rows = moved_rows(self.geoms, i, given, self._real)
             if move_in_place(self, i, rows):
                 return None
-            return refitted_mesh(self._tracer, self._faces, self.geoms, i, rows)
+            return refitted_mesh(self._tracer, self._faces, self.geoms, i, rows, count)
 
         moved = reported(checked_progress(progress), len(self._faces), "triangle", "refitting", refitted)
         if moved is not None:

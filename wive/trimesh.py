@@ -60,7 +60,7 @@ class RayMeshIntersector:
             geometry: the `trimesh.Trimesh`.
             scale_to_box: scale the mesh, by a power of two, to a size of about one.
             backend, device, accuracy, nodes, quality: as for `wive.Scene`.
-            threads: how many each query uses; None is every core. For CPU backends.
+            threads: how many building and each query use; None is every core. For CPU backends.
             dtype: of the scene's numbers: np.float32, or np.float64 if detail is finer than 1e-7 of the
                 mesh's size, but not with accuracy "exact".
 
@@ -200,7 +200,8 @@ class RayMeshIntersector:
         mesh_hash = hash(self.mesh)
         kept = self._placed
         if kept is None or kept[0] != mesh_hash:
-            kept = mesh_hash, PlacedMesh(self.mesh, self._scale_to_box, self._real, self._options)
+            options = {**self._options, "threads": self._threads}
+            kept = mesh_hash, PlacedMesh(self.mesh, self._scale_to_box, self._real, options)
             self._placed = kept
         return kept[1]
 

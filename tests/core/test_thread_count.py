@@ -100,3 +100,39 @@ def test_calls_at_once_share_the_cores() -> None:
     other.join()
     assert fewest == 1
     assert _cpu.thread_count() == _cpu.usable_cores()
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_threads_that_build_are_as_many_as_asked(threads, monkeypatch, tmp_path):
+    built = []
+    real = _cpu.Bvh
+
+    def bvh(*args, **options):
+        built.append(options["threads"])
+        return real(*args, **options)
+
+    monkeypatch.setattr(_cpu, "Bvh", bvh)
+    vertices, faces = sphere(2)
+    scene = wive.Scene(vertices, faces, threads=threads)
+    wive.Scene.from_meshes([(vertices, faces)] * 2, threads=threads)
+    wive.Scene.from_heightfield(np.zeros((9, 9)), np.arange(9), np.arange(9), threads=threads)
+    scene.save(tmp_path / "saved")
+    wive.Scene.from_file(tmp_path / "saved", threads=threads)  # builds nothing
+    wive.Scene.from_file(tmp_path / "saved", accuracy="fast", threads=threads)
+    assert built == [threads] * 4
+    scene.refit(vertices + np.float32(1), threads=threads)
+    assert scene.bounds[0].min() == (vertices + np.float32(1)).min()
+
+
+@pytest.mark.parametrize("call", ["scene", "from_file", "refit"])
+@pytest.mark.parametrize("threads", [0, -1, 1.5, "2"])
+def test_a_bad_number_of_threads_that_build_is_one_line(call, threads, tmp_path):
+    scene = wive.Scene(*sphere(1))
+    scene.save(tmp_path / "saved")
+    calls = {
+        "scene": lambda: wive.Scene(*sphere(1), threads=threads),
+        "from_file": lambda: wive.Scene.from_file(tmp_path / "saved", threads=threads),
+        "refit": lambda: scene.refit(scene.vertices, threads=threads),
+    }
+    with pytest.raises((ValueError, TypeError), match=r"^threads must be[^\n]*$"):
+        calls[call]()

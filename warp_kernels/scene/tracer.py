@@ -226,9 +226,9 @@ class WarpTracer:
         launch(odd, len(rows), [counts], [inside], device=self.device, record_tape=False)
         return inside
 
-    def refitted(self, vertices: Floats) -> WarpTracer:
+    def refitted(self, vertices: Floats, threads: int) -> WarpTracer:
         """A tracer of moved vertices, as many as before."""
-        return WarpTracer(self.bvh.refitted(vertices), self.faces, self.device, self.geoms)
+        return WarpTracer(self.bvh.refitted(vertices, threads), self.faces, self.device, self.geoms)
 
     def rows_renderer(self, camera: Image, image: Image, look: Look) -> Callable[[int, int], int]:
         """A function that renders rows [begin, end) into `image` and returns how many rays it traced."""

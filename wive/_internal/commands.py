@@ -156,8 +156,8 @@ def _scene(options: Namespace, vertices: NDArray[Any], faces: NDArray[Any]) -> S
 
 def _given(options: Namespace) -> dict[str, Any]:
     """The options of `Scene` that the user gave."""
-    names = ("backend", "device", "accuracy", "nodes")
-    given = {name: getattr(options, name) for name in names}
+    names = ("backend", "device", "accuracy", "nodes", "threads")
+    given = {name: getattr(options, name, None) for name in names}
     return {name: value for name, value in given.items() if value is not None}
 
 

@@ -136,9 +136,9 @@ class CpuTracer:
         """Whether every edge is in an even number of triangles."""
         return closed_scene(self, self._faces)
 
-    def refitted(self, vertices: Floats) -> CpuTracer:
+    def refitted(self, vertices: Floats, threads: int) -> CpuTracer:
         """A tracer of moved vertices, as many as before."""
-        return CpuTracer(self.bvh.refitted(vertices), self._faces, self.backend, self.geoms)
+        return CpuTracer(self.bvh.refitted(vertices, threads), self._faces, self.backend, self.geoms)
 
     def rows_renderer(self, camera: Image, image: Image, look: Look) -> Callable[[int, int], int]:
         """A function that renders rows [begin, end) into `image` and returns how many rays it traced.

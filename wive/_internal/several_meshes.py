@@ -80,7 +80,9 @@ def moved_rows(geoms: Geoms, i: int, vertices: ArrayLike, real: Real) -> Floats:
     return mesh_arguments.moved_vertices(vertices, last - first, real, f"those of mesh {i}")
 
 
-def refitted_mesh(tracer: Tracer, faces: NDArray[np.int32], geoms: Geoms, i: int, rows: Floats) -> Tracer:
+def refitted_mesh(
+    tracer: Tracer, faces: NDArray[np.int32], geoms: Geoms, i: int, rows: Floats, threads: int
+) -> Tracer:
     """A tracer whose mesh `i` has its vertices at `rows`.
 
     Raises ValueError that names a vertex as it is numbered in that mesh.
@@ -91,7 +93,7 @@ def refitted_mesh(tracer: Tracer, faces: NDArray[np.int32], geoms: Geoms, i: int
     points = points.copy()
     points[first:last] = rows
     try:
-        return tracer.refitted(arguments.read_only(points))
+        return tracer.refitted(arguments.read_only(points), threads)
     except ValueError:
         _make_alone("", *_part(points, faces, geoms, i))
         raise

@@ -80,8 +80,8 @@ class Tracer(Protocol):
     def signed_distance(self, points: Points, sign: SignOption, work: Work) -> Any:
         """(n,) distances, negative inside; in the points' library and shape."""
 
-    def refitted(self, vertices: Floats) -> Tracer:
-        """A tracer of moved vertices, as many as before."""
+    def refitted(self, vertices: Floats, threads: int) -> Tracer:
+        """A tracer of moved vertices, as many as before; threads 0 is every core."""
 
     def rows_renderer(self, camera: Image, image: Image, look: Look) -> Callable[[int, int], int]:
         """A function that renders rows [begin, end) into `image` and returns how many rays it traced."""
