@@ -98,7 +98,9 @@ def make_loop(
         while share.going != 0:
             at_leaves = wp.int32(wp.bit_count(vote_on(walk.child < END_OF_STACK)))
             at_nodes = wp.int32(wp.bit_count(vote_on(walk.child > END_OF_STACK)))
-            if at_leaves + at_nodes <= wp.where(share.next_ray < end, warp_width() - IDLE_LANES, 0):
+            # One thread alone fetches when it is idle.
+            fewest = wp.where(share.next_ray < end, wp.max(warp_width() - IDLE_LANES, 0), 0)
+            if at_leaves + at_nodes <= fewest:
                 ends = walk.child == END_OF_STACK
                 idle = vote_on(ends)
                 last = settled(units, lane, stack, walk)
