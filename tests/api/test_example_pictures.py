@@ -37,7 +37,11 @@ def test_a_program_leaves_a_picture_and_says_so(
     program = example(name)
     for number, fewer in FEWER.get(name, {}).items():
         monkeypatch.setattr(program, number, fewer)
-    program.main()
+    try:
+        program.main()
+    finally:
+        if NEEDS.get(name) == "trimesh":
+            wive.trimesh.uninstall()
     assert f"wrote {name}.png" in capsys.readouterr().out
     with pillow.open(tmp_path / f"{name}.png") as picture:
         pixels = np.asarray(picture.convert("RGB")).astype(int)

@@ -54,7 +54,7 @@ REGISTERS = {
     ("fast", 8): 80,
     ("watertight", 8): 88,
     ("fast", 1): 64,
-    ("watertight", 1): 64,
+    ("watertight", 1): 72,
     ("exact", 8): 128,
     ("exact", 1): 128,
 }
@@ -63,7 +63,7 @@ COMPRESSED_REGISTERS = {
     ("fast", 8): 80,
     ("watertight", 8): 88,
     ("fast", 1): 64,
-    ("watertight", 1): 64,
+    ("watertight", 1): 72,
     ("exact", 8): 128,
     ("exact", 1): 128,
 }
@@ -75,12 +75,12 @@ DOUBLE_REGISTERS = {
     ("watertight", 1): 112,
 }
 # Bytes: a thread that owns its stack holds a child and, for the closest hit, a distance per entry, and up to
-# 24 words of the ray behind them. A group's stack is in shared memory.
+# 26 words of the ray behind them, whose parts begin at even words. A group's stack is in shared memory.
 STACK_BYTES = {
-    "closest": STACK * 8 + 96,
-    "any": STACK * 4 + 96,
-    "count": STACK * 4 + 96,
-    "all": STACK * 4 + 96,
+    "closest": STACK * 8 + 104,
+    "any": STACK * 4 + 104,
+    "count": STACK * 4 + 104,
+    "all": STACK * 4 + 104,
 }
 DOUBLE_STACK_BYTES = 64  # more: rays are kept in double
 EXACT_STACK_BYTES = 9 * 1024  # integers of the exact test, of two triangles if hits are compared

@@ -15,7 +15,7 @@ from support.meshes import sphere
 import wive
 from wive import _cpu, warp_kernels
 from wive.warp_kernels.tree import quiet
-from wive.warp_kernels.tree.ranks import INVERT_ORDERS
+from wive.warp_kernels.tree.rewriting import rewrite_nodes
 
 pytestmark = pytest.mark.timeout(120)
 
@@ -71,9 +71,9 @@ def test_a_kernel_that_is_not_in_the_cache_is_said_to_be_compiled(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     wp.config.kernel_cache_dir, wp.config.log_level = str(tmp_path), level
-    kernel = INVERT_ORDERS["float32"]
+    kernel = rewrite_nodes
     quiet._say_if_compiled(kernel, device="cpu", block_dim=128)
-    said = f"wive: compiling invert_orders for cpu, kept in {tmp_path}\n"
+    said = f"wive: compiling rewrite_nodes for cpu, kept in {tmp_path}\n"
     assert capsys.readouterr().err == (said if says else "")
     folder = tmp_path / kernel.module.get_module_identifier(1)
     folder.mkdir()
@@ -92,7 +92,7 @@ def test_a_launch_of_nothing_is_not_said_to_compile(
     settings.setattr(quiet, "_launched", set())
     none = wp.empty(0, dtype=wp.float32, device="cpu")
     for dim in (0, (0, 8), (3, 0)):
-        quiet.launch(INVERT_ORDERS["float32"], dim, [none], [], device="cpu")
+        quiet.launch(rewrite_nodes, dim, [none], [], device="cpu")
     assert capsys.readouterr().err == "" and quiet._launched == set()
 
 
@@ -102,7 +102,7 @@ import warp as wp, wive
 scene = wive.Scene([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], device="cpu")
 print(wp.config.log_level == wp.LOG_INFO)"""
     environment = {**os.environ, "WARP_CACHE_PATH": str(tmp_path)}
-    for expected in (["wive: compiling invert_orders for cpu, kept in "], []):
+    for expected in (["wive: compiling rewrite_nodes for cpu, kept in "], []):
         command = [sys.executable, "-c", code]
         ran = subprocess.run(
             command, capture_output=True, text=True, timeout=100, cwd=tmp_path, env=environment, check=True

@@ -18,7 +18,7 @@ MODULE_OPTIONS = {"fuse_fp": False, "enable_backward": False}
 
 # Registers per thread, by accuracy and lane form: more would leave room for fewer warps, fewer would make
 # kernels spill. Kernels of exact and of float64 trees, and those with counters, take what they need.
-MOST_REGISTERS = {("fast", 8): 80, ("fast", 1): 64, ("watertight", 8): 88, ("watertight", 1): 64}
+MOST_REGISTERS = {("fast", 8): 80, ("fast", 1): 64, ("watertight", 8): 88, ("watertight", 1): 72}
 
 
 @functools.cache
