@@ -16,6 +16,7 @@ from bench.contenders.build_race import build_rows, tree_row
 from bench.contenders.compiled_shim import BenchError
 from bench.contenders.embree_race import TUNED, Contender, packet_rows, speed_rows
 from bench.support import report
+from bench.support.groups import grouped
 from bench.support.options import ACCURACIES, NODES, in_flights, listed, scene_parser
 from bench.support.rays import KINDS, recorded_rays
 from bench.support.scenes import LARGEST, SCENES, SceneFolder
@@ -112,17 +113,15 @@ def main(options: Sequence[str]) -> None:
 
 def mean_rows(speed: Sequence[report.Row]) -> list[report.Row]:
     """Geometric mean and lowest ratio over scenes, per accuracy, contender and kind of rays or all kinds."""
-    keys = ("accuracy", "kernel", "in_flight", "nodes")
     rows = []
-    for key in dict.fromkeys(tuple(row[name] for name in keys) for row in speed):
-        group = [row for row in speed if tuple(row[name] for name in keys) == key]
+    for key, group in grouped(speed, ("accuracy", "kernel", "in_flight", "nodes")):
         kinds = list(dict.fromkeys(row["rays"] for row in group))
         for kind in [*kinds, "all"]:
             chosen = [row for row in group if kind in ("all", row["rays"])]
             lowest = min(chosen, key=lambda row: float(row["ratio"]))
             rows.append(
                 {
-                    **dict(zip(keys, key, strict=True)),
+                    **key,
                     "rays": kind,
                     "mean": geometric_mean([row["ratio"] for row in chosen]),
                     "lowest": lowest["ratio"],

@@ -24,10 +24,11 @@ from bench.contenders.compiled_shim import BenchError
 from bench.contenders.embree_race import TUNED
 from bench.contenders.order_study import SORTING, STORED_ORDERS, Order
 from bench.support import report
+from bench.support.groups import mean_rows
 from bench.support.options import listed, scene_parser
 from bench.support.rays import Rays, recorded_rays
 from bench.support.scenes import Mesh, SceneFolder
-from bench.support.timing import QUICK, Effort, compare_in_turn, geometric_mean, one_core, timed
+from bench.support.timing import QUICK, Effort, compare_in_turn, one_core, timed
 from wive import _cpu
 
 DISTANCE = "distance"
@@ -161,16 +162,6 @@ def check_same_tree(trees: Sequence[_cpu.Bvh], name: str) -> None:
         )
         if not alike:
             raise BenchError(f"trees of {name} differ in more than their order")
-
-
-def mean_rows(rows: Sequence[report.Row], keys: Sequence[str], columns: Sequence[str]) -> list[report.Row]:
-    """Geometric means of some columns over scenes, per combination of the keys."""
-    means: list[report.Row] = []
-    for key in dict.fromkeys(tuple(row[name] for name in keys) for row in rows):
-        group = [row for row in rows if tuple(row[name] for name in keys) == key]
-        values = {column: geometric_mean([row[column] for row in group]) for column in columns}
-        means.append({**dict(zip(keys, key, strict=True)), **values})
-    return means
 
 
 def parse_options(options: Sequence[str]) -> argparse.Namespace:

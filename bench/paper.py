@@ -27,6 +27,7 @@ from bench.contenders.embree_race import TUNED, Contender, embree_tree
 from bench.contenders.native_embree import EmbreeMesh
 from bench.embree import usable_kernels
 from bench.support import report
+from bench.support.groups import grouped
 from bench.support.options import ACCURACIES, Accuracy, in_flights, listed, scene_parser
 from bench.support.scenes import Mesh, SceneFolder
 from bench.support.timing import Comparison, geometric_mean, one_core
@@ -155,14 +156,13 @@ def percent(ratio: float) -> float:
 
 def mean_rows(rows: Sequence[report.Row]) -> list[report.Row]:
     """Geometric mean and range of the gain over scenes, per accuracy, kernel and rays in flight."""
-    keys = ("accuracy", "kernel", "in_flight")
     means = []
-    for key in dict.fromkeys(tuple(row[name] for name in keys) for row in rows):
-        gains = [row["gain"] for row in rows if tuple(row[name] for name in keys) == key]
+    for key, group in grouped(rows, ("accuracy", "kernel", "in_flight")):
+        gains = [row["gain"] for row in group]
         mean = percent(geometric_mean([1 + gain / 100 for gain in gains]))
         means.append(
             {
-                **dict(zip(keys, key, strict=True)),
+                **key,
                 "mean_gain": mean,
                 "lowest": min(gains),
                 "highest": max(gains),

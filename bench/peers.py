@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from bench.contenders.compiled_shim import BenchError
 from bench.contenders.native_peers import LIBRARIES, PeerTree, peer_library
 from bench.support import report
+from bench.support.groups import mean_rows
 from bench.support.options import listed, scene_parser
 from bench.support.rays import KINDS, Rays, recorded_rays
 from bench.support.scenes import Mesh, SceneFolder
@@ -29,7 +30,6 @@ from bench.support.timing import (
     Effort,
     compare,
     compare_in_turn,
-    geometric_mean,
     one_core,
     timed,
     wall_timed,
@@ -66,7 +66,7 @@ def main(options: Sequence[str]) -> None:
             rows.append(row)
             report.print_progress(row, ("scene", *KEYS, *WAYS))
         builds += build_rows(mesh, shims, QUICK if chosen.quick else BUILD_EFFORT)
-    means = mean_rows(rows)
+    means = mean_rows(rows, KEYS, list(WAYS))
     report.print_table(rows, COLUMNS, "One core: the peer's seconds over wive's")
     report.print_table(means, [*KEYS, *WAYS], "Geometric means over the scenes")
     report.print_table(builds, list(builds[0]), "Building on all cores: the peer's seconds over wive's")
@@ -125,16 +125,6 @@ def build_rows(mesh: Mesh, shims: dict[str, ctypes.CDLL], effort: Effort) -> Ite
             outcome = compare(ours, theirs, effort)
             row |= {builder: outcome.ratio, f"{builder}_seconds": outcome.their_seconds}
         yield row
-
-
-def mean_rows(rows: Sequence[report.Row]) -> list[report.Row]:
-    """The geometric means over scenes."""
-    found = []
-    for key in dict.fromkeys(tuple(row[name] for name in KEYS) for row in rows):
-        group = [row for row in rows if tuple(row[name] for name in KEYS) == key]
-        means = {way: geometric_mean([row[way] for row in group]) for way in WAYS}
-        found.append({**dict(zip(KEYS, key, strict=True)), **means})
-    return found
 
 
 def parse_options(options: Sequence[str]) -> argparse.Namespace:

@@ -16,6 +16,7 @@ import numpy as np
 from bench.contenders.python_callers import ALL, QUERIES, SCENE, Caller, Ours, absent, others
 from bench.latency import QUICK_SECONDS, measured
 from bench.support import report
+from bench.support.groups import grouped
 from bench.support.options import listed, scene_parser
 from bench.support.rays import Rays, recorded_rays
 from bench.support.scenes import Mesh, SceneFolder
@@ -147,14 +148,12 @@ def single_rows(
 
 def mean_rows(rows: Sequence[report.Row]) -> list[report.Row]:
     """Geometric mean and lowest ratio over scenes and kinds of rays, per rival and number of threads."""
-    keys = ("query", "ours", "other", "threads")
     means = []
-    for key in dict.fromkeys(tuple(row[name] for name in keys) for row in rows):
-        group = [row for row in rows if tuple(row[name] for name in keys) == key]
+    for key, group in grouped(rows, ("query", "ours", "other", "threads")):
         lowest = min(group, key=lambda row: float(row["ratio"]))
         means.append(
             {
-                **dict(zip(keys, key, strict=True)),
+                **key,
                 "mean": geometric_mean([row["ratio"] for row in group]),
                 "lowest": lowest["ratio"],
                 "lowest_at": f"{lowest['scene']}, {lowest['rays']}",

@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
 from bench.support import report
+from bench.support.groups import distinct, grouped
 from bench.support.timing import geometric_mean
 
 DOCUMENT = report.REPOSITORY / "docs" / "benchmarks.md"
@@ -50,11 +51,6 @@ def markdown(columns: Sequence[str], rows: Iterable[Sequence[object]], texts: in
     """A table; the first `texts` columns to the left, the others to the right."""
     lines = [columns, ["---"] * texts + ["---:"] * (len(columns) - texts), *rows]
     return "".join("| " + " | ".join(map(str, line)) + " |\n" for line in lines)
-
-
-def distinct(rows: Sequence[report.Row], *keys: str) -> list[tuple[object, ...]]:
-    """The combinations of these columns, in order of appearance."""
-    return list(dict.fromkeys(tuple(row[key] for key in keys) for row in rows))
 
 
 def where(rows: Sequence[report.Row], **wanted: object) -> list[report.Row]:
@@ -247,11 +243,10 @@ def peers_means(content: report.Row) -> str:
     """Speed over other libraries' trees: geometric mean over the scenes, and lowest."""
     ways = ("watertight", "fast", "one_ray")
     lines = []
-    for peer, builder, rays in distinct(content["rows"], "peer", "builder", "rays"):
-        rows = where(content["rows"], peer=peer, builder=builder, rays=rays)
+    for key, rows in grouped(content["rows"], ("peer", "builder", "rays")):
         ratios = [[float(row[way]) for row in rows] for way in ways]
         lines.append(
-            [peer, builder, rays, *(f"{geometric_mean(found):.2f} ({min(found):.2f})" for found in ratios)]
+            [*key.values(), *(f"{geometric_mean(found):.2f} ({min(found):.2f})" for found in ratios)]
         )
     heads = ["`watertight`, batch", "`fast`, batch", "`fast`, one ray"]
     return markdown(["peer", "its builder", "rays", *heads], lines, texts=3)

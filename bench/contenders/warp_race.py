@@ -9,6 +9,7 @@ import warp as wp
 
 import wive
 from bench.contenders.mesh_query_ray import BUILDERS, MeshQuery
+from bench.support.groups import grouped
 from bench.support.rays import Rays
 from bench.support.report import Row
 from bench.support.scenes import Mesh
@@ -34,13 +35,10 @@ def compare_rows(
 
 def mean_rows(rows: Sequence[Row]) -> list[Row]:
     """Geometric mean and lowest ratio over scenes, per kind of rays, accuracy, lane form and builder."""
-    keys = ("rays", "accuracy", "lanes", "builder")
     means = []
-    for key in dict.fromkeys(tuple(row[name] for name in keys) for row in rows):
-        ratios = [row["ratio"] for row in rows if tuple(row[name] for name in keys) == key]
-        means.append(
-            {**dict(zip(keys, key, strict=True)), "mean": geometric_mean(ratios), "lowest": min(ratios)}
-        )
+    for key, group in grouped(rows, ("rays", "accuracy", "lanes", "builder")):
+        ratios = [row["ratio"] for row in group]
+        means.append({**key, "mean": geometric_mean(ratios), "lowest": min(ratios)})
     return means
 
 

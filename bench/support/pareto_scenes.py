@@ -5,6 +5,7 @@ from collections.abc import Iterator, Sequence
 from bench.contenders.pareto_contenders import wive_contenders
 from bench.contenders.speeds import speeds
 from bench.support import report
+from bench.support.groups import grouped
 from bench.support.rays import recorded_rays
 from bench.support.scenes import Mesh
 from bench.support.timing import Effort, geometric_mean
@@ -43,9 +44,8 @@ def scene_rows(mesh: Mesh, quick: bool, effort: Effort) -> Iterator[report.Row]:
 def mean_rows(rows: Sequence[report.Row]) -> list[report.Row]:
     """Geometric mean and lowest of the shares kept, per contender."""
     means = []
-    for name in dict.fromkeys(row["contender"] for row in rows):
-        mine = [row for row in rows if row["contender"] == name]
+    for key, mine in grouped(rows, ("contender",)):
         mean = {f"mean_{way}": geometric_mean([row[f"kept_{way}"] for row in mine]) for way in WAYS}
         lowest = {f"lowest_{way}": min(row[f"kept_{way}"] for row in mine) for way in WAYS}
-        means.append({"contender": name, **mean, **lowest})
+        means.append({**key, **mean, **lowest})
     return means
