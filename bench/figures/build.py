@@ -1,7 +1,6 @@
 """The figure of `bench build`: seconds over triangles, beside Embree's."""
 
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter
 
 from bench.figures import style
 from bench.support.report import Row
@@ -16,10 +15,10 @@ def draw(content: Row) -> Figure:
         key=lambda row: int(row["triangles"]),
     )
     parts = [1 / row["ratio"] for row in rows]
-    count = f"{min(parts):.2f} to {max(parts):.2f}" if len(parts) > 1 else f"{parts[0]:.2f}"
     figure, (axes,) = style.page(
         4.0,
-        f"Building takes {count} of Embree's time,\nup to {style.short(rows[-1]['triangles'])} triangles",
+        f"Building takes {style.span(parts, 2)} of Embree's time,\n"
+        f"up to {style.short(rows[-1]['triangles'])} triangles",
         f"{threads} thread{'s' * (threads > 1)}, quality {quality}; terrain and cars",
     )
     ends = []
@@ -30,11 +29,7 @@ def draw(content: Row) -> Figure:
             linewidth=2.2, markersize=6, markerfacecolor=color if side == "wive" else "white",
         )  # fmt: skip
         ends.append((seconds[-1], name, color))
-    axes.set_xscale("log")
-    axes.set_yscale("log")
-    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: style.short(value)))
-    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    axes.set_ylim(*axes.get_ylim())
+    style.logarithmic(axes)
     style.name_lines(axes, ends)
     style.scale(axes, "triangles", "seconds")
     return figure

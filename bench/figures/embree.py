@@ -38,12 +38,11 @@ def draw(content: Row) -> Figure | None:
         rows=len(ways), sharex=True,
     )  # fmt: skip
     for way, axes in zip(ways, panels, strict=True):
-        style.rows(axes, [KINDS[kind] for kind in kinds])
-        axes.set_ylim(len(kinds) - 0.5, -0.75)
-        for y, kind in enumerate(kinds):
-            ratios = [row["ratio"] for row in speed if (row["rays"], row["in_flight"]) == (kind, way)]
-            style.spread(axes, y, ratios, geometric_mean(ratios))
-        axes.axvline(1, color=style.THEIRS, linewidth=2, zorder=1)
+        ratios = {
+            KINDS[kind]: [row["ratio"] for row in speed if (row["rays"], row["in_flight"]) == (kind, way)]
+            for kind in kinds
+        }
+        style.spreads(axes, ratios)
         style.subject(axes, WAYS.get(way, f"{way} rays in flight"))
     panels[-1].set_xlim(left=0)  # of all panels, when each has its dots
     style.scale(panels[-1], f"speed, 1 = {theirs}")

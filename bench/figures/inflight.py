@@ -24,10 +24,9 @@ def draw(content: Row) -> Figure:
         for size in chosen
     ]
     best = [max(speed for _, speed, _ in line) for line in lines]
-    count = f"{min(best):.1f} to {max(best):.1f}" if len(best) > 1 else f"{best[0]:.1f}"
     figure, (axes,) = style.page(
         4.0,
-        f"Many rays in flight: {count} times the speed\nof one ray at a time",
+        f"Many rays in flight: {style.span(best, 1)} times the speed\nof one ray at a time",
         f"One thread, {kind} rays, accuracy {content['accuracy']}, {content['kernel'].upper()}",
     )
     ends = []

@@ -1,7 +1,6 @@
 """The figure of `bench latency`: million rays per second over the rays of a call."""
 
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter
 
 from bench.figures import style
 from bench.support.report import Row
@@ -37,11 +36,7 @@ def draw(content: Row) -> Figure | None:
             markersize=5,
         )  # fmt: skip
         ends.append((rows[-1]["mrays"], label, color))
-    axes.set_xscale("log")
-    axes.set_yscale("log")
-    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: style.short(value)))
-    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    axes.set_ylim(*axes.get_ylim())
+    style.logarithmic(axes)
     style.name_lines(axes, ends)
     style.scale(axes, "rays per call", "million rays per second")
     return figure

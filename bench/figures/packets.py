@@ -5,7 +5,6 @@ from matplotlib.figure import Figure
 
 from bench.figures import style
 from bench.support.report import Row
-from bench.support.timing import geometric_mean
 
 
 def draw(content: Row) -> Figure:
@@ -17,12 +16,11 @@ def draw(content: Row) -> Figure:
         f"With packets, pictures take {summary['mean']:.2f} of the time,\nat worst {summary['worst']:.2f}",
         f"One core, {content['kernel'].upper()}; light: each picture, dark: geometric mean",
     )
-    style.rows(axes, [f"from {distance:g} diagonals" for distance in distances])
-    axes.set_ylim(len(distances) - 0.5, -0.75)
-    for y, distance in enumerate(distances):
-        ratios = [row["ratio"] for row in rows if row["distance"] == distance]
-        style.spread(axes, y, ratios, geometric_mean(ratios))
-    axes.axvline(1, color=style.THEIRS, linewidth=2, zorder=1)
+    ratios = {
+        f"from {distance:g} diagonals": [row["ratio"] for row in rows if row["distance"] == distance]
+        for distance in distances
+    }
+    style.spreads(axes, ratios)
     axes.set_xticks(np.arange(0.5, 1.3, 0.1))
     style.scale(axes, "time, 1 = without packets")
     return figure

@@ -24,12 +24,11 @@ def draw(content: Row) -> Figure:
         rows=len(peers), sharex=True,
     )  # fmt: skip
     for peer, axes in zip(peers, panels, strict=True):
-        style.rows(axes, [KINDS[kind] for kind in kinds])
-        axes.set_ylim(len(kinds) - 0.5, -0.75)
-        for y, kind in enumerate(kinds):
-            ratios = [row["watertight"] for row in rows if (row["peer"], row["rays"]) == (peer, kind)]
-            style.spread(axes, y, ratios, geometric_mean(ratios))
-        axes.axvline(1, color=style.THEIRS, linewidth=2, zorder=1)
+        ratios = {
+            KINDS[kind]: [row["watertight"] for row in rows if (row["peer"], row["rays"]) == (peer, kind)]
+            for kind in kinds
+        }
+        style.spreads(axes, ratios)
         style.subject(axes, f"over {NAMES[peer]}")
     panels[-1].set_xlim(left=0)  # of all panels, when each has its dots
     style.scale(panels[-1], "speed, 1 = the other library")

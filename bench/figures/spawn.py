@@ -24,11 +24,7 @@ def draw(content: Row) -> Figure:
         f"Spawning rays from hits takes {mean:.2f} of tracing them",
         f"One core; light: each of {scenes} scenes in float32 and float64, dark: geometric mean",
     )
-    style.rows(axes, list(PARTS.values()))
-    axes.set_ylim(len(PARTS) - 0.5, -0.75)
-    for y, part in enumerate(PARTS):
-        ratios = [row[part] for row in rows]
-        style.spread(axes, y, ratios, geometric_mean(ratios))
+    style.spreads(axes, {name: [row[part] for row in rows] for part, name in PARTS.items()}, beside=None)
     axes.set_xlim(left=0)
     style.scale(axes, "seconds, 1 = the trace of the hits")
     return figure

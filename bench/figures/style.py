@@ -3,12 +3,15 @@
 Sizes are chosen so that a figure can be read when it is 300 pixels wide.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
+from matplotlib.ticker import FuncFormatter
+
+from bench.support.timing import geometric_mean
 
 WIDTH = 6.4  # inches
 OURS, THEIRS, OTHER = "#0969da", "#8c959f", "#bc4c00"
@@ -122,6 +125,16 @@ def rows(axes: Axes, names: Sequence[str]) -> None:
     axes.set_ylim(len(names) - 0.4, -0.6)
 
 
+def spreads(axes: Axes, values: Mapping[str, Sequence[float]], beside: float | None = 1) -> None:
+    """A row per name with its single values and their geometric mean; a line at the value to compare with."""
+    rows(axes, list(values))
+    axes.set_ylim(len(values) - 0.5, -0.75)
+    for y, found in enumerate(values.values()):
+        spread(axes, y, found, geometric_mean(list(found)))
+    if beside is not None:
+        axes.axvline(beside, color=THEIRS, linewidth=2, zorder=1)
+
+
 def spread(
     axes: Axes, y: float, values: Sequence[float], mean: float, color: str = OURS, form: str = "{:.2f}"
 ) -> None:
@@ -130,6 +143,21 @@ def spread(
     axes.plot(values, [y] * len(values), "o", color=LIGHT, markersize=6, zorder=3)
     axes.plot(mean, y, "o", color=color, markersize=9, zorder=4)
     name_point(axes, mean, y, form.format(mean), color, (0, 11), "center")
+
+
+def logarithmic(axes: Axes) -> None:
+    """Logarithmic scales, of counts along x and of plain numbers along y; limits stay as they are then."""
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: short(value)))
+    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axes.set_ylim(*axes.get_ylim())
+
+
+def span(values: Sequence[float], digits: int) -> str:
+    """From the lowest to the highest, or the one value that there is."""
+    ends = (min(values), max(values)) if len(values) > 1 else values
+    return " to ".join(f"{value:.{digits}f}" for value in ends)
 
 
 def short(count: float) -> str:
