@@ -42,7 +42,7 @@ public:
     std::span<const std::uint32_t> span() const { return {prims_.data(), count_}; }
 
 private:
-    // A sorting network of five comparisons: no branch, whose way no processor would foresee.
+    // A sorting network of five comparisons, without branches, which would be mispredicted.
     void sort_block() {
         static_assert(block_width == 4);
         constexpr std::array<std::array<std::size_t, 2>, 5> pairs{{{0, 1}, {2, 3}, {0, 2}, {1, 3}, {1, 2}}};
@@ -231,8 +231,8 @@ private:
         for (std::uint32_t i = tree.begin; i < tree.end; ++i) mesh_.prefetch_corners(tree_.refs[i].prim());
     }
 
-    // Some hundred at once: neither do they follow each other subtree by subtree, nor does a processor foresee where
-    // the next begin.
+    // Some hundred at once: the references of one subtree don't lie behind those of the one before, so no processor
+    // foresees where they begin.
     void prefetch_refs(const Subtree& tree) const {
         for (std::uint32_t i = tree.begin; i < tree.end; i += 2) __builtin_prefetch(&tree_.refs[i]);
     }

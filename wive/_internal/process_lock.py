@@ -12,7 +12,8 @@ from contextlib import contextmanager
 def process_lock() -> threading.RLock:
     """A lock that forking waits for: the child would find one that another thread holds taken for ever.
 
-    Forking takes the lock made last first, so what its holder takes as well must have been made before.
+    Forking takes locks in the reverse order in which they were made. So a thread that holds one may take
+    another only if that was made earlier.
     """
     lock = threading.RLock()
     if hasattr(os, "register_at_fork"):  # not on Windows, which has no fork
