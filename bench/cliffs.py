@@ -2,7 +2,8 @@
 
 `scale`: a ball of 0.5 mm triangles above a ground of 2 m to 200 km. `distance`: origins up to 1e6 radii from
 that ball. `plane`: rays that lie in a large flat part, over rays across it. `doubt`: rays through vertices
-and edges and coincident triangles in `exact`, over `fast`. `misses`: rays of which most miss the scene, over
+and edges and coincident triangles in `exact`, over `fast`. `leaving`: rays that leave a scene of compressed
+nodes from its outer side, over float32 nodes. `misses`: rays of which most miss the scene, over
 Embree's robust single rays. `bar`: what `ratio` may be at most. Everything runs on one pinned core.
 """
 
@@ -77,7 +78,7 @@ def measured(cliff: Cliff, effort: Effort) -> report.Row:
 
 def closest_hits(rays: Rays) -> Callable[[], None]:
     """A function that traces the rays once; it has run before."""
-    scene = wive.Scene(rays.vertices, rays.faces, accuracy=rays.accuracy)
+    scene = wive.Scene(rays.vertices, rays.faces, accuracy=rays.accuracy, nodes=rays.nodes)
 
     def trace() -> None:
         scene.intersect(rays.origins, rays.directions, threads=1)

@@ -11,6 +11,7 @@ PARTS = {
     "distance": "origins far away",
     "plane": "rays within a floor",
     "doubt": "rays at vertices and edges",
+    "leaving": "rays that leave at once, compressed",
     "misses": "misses, over Embree's",
 }
 

@@ -1,7 +1,7 @@
 """Inputs on which the cost of a ray could jump, each with the input that it is compared to."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -10,12 +10,14 @@ from numpy.typing import NDArray
 from wive._internal.precision import Floats
 
 Accuracy = Literal["fast", "watertight", "exact"]
-Part = Literal["scale", "distance", "plane", "doubt"]
+Nodes = Literal["float32", "compressed"]
+Part = Literal["scale", "distance", "plane", "doubt", "leaving"]
 RADIUS = 0.1  # of the ball, in metres
 USUAL_GROUND = 2.0  # metres across
 GROUNDS = {2e3: 2.0, 2e4: 2.0, 2e5: 4.0}  # by how much a ray may cost more than above the usual one
 DISTANCES = (1e1, 1e2, 1e3, 1e4, 1e5, 1e6)  # of the ball's radius
-FARTHER, IN_PLANE, IN_DOUBT = 2.0, 100.0, 20.0  # by how much rays may cost more
+FARTHER, IN_PLANE, IN_DOUBT, LEAVING = 2.0, 100.0, 20.0, 2.0  # by how much rays may cost more
+OUTSIDE = 1e-4  # where rays start that leave, over half the room's size
 GRID = 700  # squares along a side of the flat part
 COINCIDENT = 100_000
 
@@ -31,6 +33,7 @@ class Rays:
     origins: Floats
     directions: Floats
     accuracy: Accuracy = "watertight"
+    nodes: Nodes = "float32"
 
     def typed(self, dtype: type[np.floating], accuracy: Accuracy) -> "Rays":
         """The same in this dtype and accuracy."""
@@ -64,6 +67,7 @@ def cliffs(count: int, levels: int) -> Iterator[Cliff]:
     yield from _distance(count, levels)
     yield from _plane(min(count, 500))
     yield from _doubt(count, levels)
+    yield _leaving(count, levels)
 
 
 def _scale(count: int, levels: int) -> Iterator[Cliff]:
@@ -123,6 +127,24 @@ def _doubt(count: int, levels: int) -> Iterator[Cliff]:
     }
     for case, rays in sets.items():
         yield Cliff("doubt", case, rays.typed(np.float32, "exact"), rays.typed(np.float32, "fast"), IN_DOUBT)
+
+
+def _leaving(count: int, levels: int) -> Cliff:
+    """Rays from the outer side of a room around the ball, outwards, in both node forms."""
+    random = np.random.default_rng(4)
+    vertices, faces = _ball(levels)
+    room = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
+    sides = np.array([[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1],
+                      [2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4], [1, 5, 7], [1, 7, 3]])  # fmt: skip
+    origins = random.uniform(-1, 1, (count, 3))
+    axes, ends = random.integers(3, size=count), random.choice([-1.0, 1.0], count)
+    origins[np.arange(count), axes] = ends * (1 + OUTSIDE)
+    directions = random.normal(size=(count, 3))
+    directions[np.arange(count), axes] = ends * np.abs(directions[np.arange(count), axes])
+    solid = np.vstack([faces, sides + len(vertices)]).astype(np.int32)
+    usual = Rays(np.vstack([vertices * RADIUS, room]), solid, origins, directions)
+    usual = usual.typed(np.float32, "watertight")
+    return Cliff("leaving", "compressed nodes", replace(usual, nodes="compressed"), usual, LEAVING)
 
 
 def _ball_above_ground(size: float, count: int, levels: int) -> Rays:

@@ -48,8 +48,8 @@ private:
         return true;
     }
 
-    // The box of the root's children, which has the slack of their planes. Without children its middle is NaN, by which
-    // no ray is known to miss.
+    // The box of the root's children, within the tree's extent: planes of compressed nodes may lie outside of it.
+    // Without children its middle is NaN, by which no ray is known to miss.
     void find_box() {
         const auto& root = bvh_.template node<Layout>(inner_child(0));
         for (int axis = 0; axis < 3; ++axis) {
@@ -59,6 +59,9 @@ private:
                 low = std::min(low, root.plane(low_row(axis), lane));
                 high = std::max(high, root.plane(high_row(axis), lane));
             }
+            const double extent = bvh_.extent[axis];
+            low = std::max(low, -extent);
+            high = std::min(high, extent);
             middle_[axis] = static_cast<float>(0.5 * (low + high));
             half_[axis] = static_cast<float>(0.5 * (high - low));
             largest_ = std::max({largest_, static_cast<float>(-low), static_cast<float>(high)});

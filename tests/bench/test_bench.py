@@ -130,7 +130,7 @@ def test_bench_inflight_counts_steps_and_measures_memory(bench: Callable[..., di
 def test_bench_cliffs_compares_every_input(bench: Callable[..., dict[str, Any]]) -> None:
     content = bench("cliffs", "--scenes", SCENE)
     parts = {row["part"]: row for row in content["rows"]}
-    assert parts.keys() == {"scale", "distance", "plane", "doubt", "misses"}
+    assert parts.keys() == {"scale", "distance", "plane", "doubt", "leaving", "misses"}
     assert all(row["ratio"] > 0 and row["ray_us"] > 0 for row in content["rows"])
     assert 0.5 < parts["misses"]["missing"] < 1
 
