@@ -40,7 +40,7 @@ struct Processor {
         // Intel's Software Developer's Manual, volume 2, CPUID, and AMD's volume 3, appendix E.
         constexpr int fma = 12, popcnt = 23, osxsave = 27, lzcnt = 5;                       // words c
         constexpr int bmi1 = 3, avx2_bit = 5, bmi2 = 8, f = 16, dq = 17, bw = 30, vl = 31;  // word b of leaf 7
-        constexpr int xmm = 1, ymm = 2, masks = 5, zmm_low = 6, zmm_high = 7;               // XCR0
+        constexpr int xmm = 1, ymm = 2;                                                     // XCR0
         const std::uint32_t basic = cpuid(1).c, more = cpuid(7).b, extended = cpuid(0x80000001u).c;
         if (!has_all(basic, osxsave)) return;
         const std::uint32_t kept = kept_registers();
@@ -49,6 +49,7 @@ struct Processor {
 #if defined(__APPLE__)
         const bool keeps_zmm = true;  // macOS sets these bits at a thread's first use of such a register
 #else
+        constexpr int masks = 5, zmm_low = 6, zmm_high = 7;  // XCR0
         const bool keeps_zmm = has_all(kept, masks, zmm_low, zmm_high);
 #endif
         avx512 = avx2 && has_all(more, f, dq, bw, vl) && keeps_zmm;
