@@ -85,6 +85,18 @@ def test_a_full_disk_is_one_line(folder, capsys, monkeypatch):
     assert sorted(folder.iterdir()) == before
 
 
+def test_a_folder_of_hits_is_complete_or_in_the_way_but_no_part_of_the_mesh(folder, capsys):
+    write_rays("npy", folder, some_rays())
+    command = "rays.npy", "-o", "hits/"
+    assert trace(*command) == 0
+    before = content_of(folder / "hits")
+    assert trace(*command) == 2
+    assert "output folder 'hits/' exists" in capsys.readouterr().err
+    assert trace(*command, "--resume") == 0
+    assert f"complete already, {COUNT:,} rays" in capsys.readouterr().out
+    assert content_of(folder / "hits") == before
+
+
 @pytest.mark.parametrize(
     ("arguments", "text"),
     [

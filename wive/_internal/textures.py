@@ -15,9 +15,12 @@ MOST_SPELLING = 12
 
 
 def refuse_part(mesh: PathLike, output: str) -> None:
-    """Raise ValueError if a file would be replaced that a mesh file, or a material file of it, names."""
+    """Raise ValueError if a file would be replaced that a mesh file, or a material file of it, names.
+
+    Folders are never replaced.
+    """
     names = {os.path.basename(output), os.path.basename(os.path.realpath(output))}
-    if os.path.exists(output) and any(_names(file, names) for file in _files(file_name(mesh))):
+    if os.path.isfile(output) and any(_names(file, names) for file in _files(file_name(mesh))):
         raise ValueError(
             f"output file {output!r} exists and the mesh {file_name(mesh)!r} names it, "
             "as its texture or another part: choose another name"
