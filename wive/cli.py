@@ -128,17 +128,11 @@ def _add_render(subparsers: "argparse._SubParsersAction[_Parser]") -> None:
     )
     parser.add_argument("--reach", type=float, help="distance from which surfaces do not occlude, of ao")
     for name, meaning in (
-        ("eye", "where the camera is"),
-        ("target", "what is in the picture's middle"),
-        ("up", "what is up in the picture"),
+        ("eye", "where the camera is; default: where it sees most of the mesh"),
+        ("target", "what is in the picture's middle; default: what shows most of the mesh"),
+        ("up", "what is up in the picture; default: as the mesh seems to stand"),
     ):
-        parser.add_argument(
-            f"--{name}",
-            type=float,
-            nargs=3,
-            metavar=("X", "Y", "Z"),
-            help=f"{meaning}; default: shows most of the mesh",
-        )
+        parser.add_argument(f"--{name}", type=float, nargs=3, metavar=("X", "Y", "Z"), help=meaning)
     parser.add_argument(
         "--fov", type=float, help="vertical field of view in degrees; default: 40, in rooms 65"
     )

@@ -1,4 +1,4 @@
-"""The commands in docs/command_line.md run as they are printed."""
+"""The commands in docs/command_line.md run as they are printed, and it has every command and option."""
 
 import re
 from pathlib import Path
@@ -62,3 +62,12 @@ def test_the_page_has_every_command(capsys: pytest.CaptureFixture[str]) -> None:
     assert commands is not None
     listed = {line.split()[0] for line in commands[1].splitlines()}
     assert listed == {command.split()[0] for command in COMMANDS}
+
+
+@pytest.mark.parametrize("command", ["render", "trace", "info", "backends"])
+def test_the_page_has_every_option(command: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        main([command, "--help"])
+    options = set(re.findall(r"^  .*?(--[\w-]+)", capsys.readouterr().out, re.MULTILINE))
+    named = re.findall(r"`(--[\w-]+)`", (ROOT / PAGE).read_text(encoding="utf-8"))
+    assert options - {"--help"} <= set(named)
