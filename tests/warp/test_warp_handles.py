@@ -132,6 +132,8 @@ def test_what_is_no_handle_and_no_tree_is_refused_with_what_to_pass() -> None:
     scene = scene_of("watertight", "float32")
     with pytest.raises(TypeError, match=r"got the Tree itself: pass scene\.tree\.handle$"):
         launched(scene.tree)
+    with pytest.raises(TypeError, match=r"got a Scene: pass scene\.tree\.handle$"):
+        launched(scene)
     with pytest.raises(
         TypeError, match=r"^tree must be a wive\.warp_kernels\.Tree, got Scene: pass scene\.tree$"
     ):

@@ -21,7 +21,7 @@ def make_function(accuracy: str, closest_point: wp.Function | None = None) -> wp
         """The closest point of the surface, if it is not farther away than max_distance.
 
         Bit for bit what `wive.Scene.closest` returns, in kernels whose module has `fuse_fp` off. It takes the
-        handles that `closest_hit` takes, and has no gradient.
+        handles of float32 scenes, and has no gradient.
         """
         closest = ClosestPoint()
         closest.distance = wp.inf

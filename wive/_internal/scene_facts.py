@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
@@ -65,6 +65,10 @@ class SceneFacts:
     def tree(self) -> Tree:
         """The tree on the scene's Warp device, for `wive.warp_kernels`; ValueError for CPU backends."""
         return self._tracer.tree
+
+    def __ctype__(self) -> NoReturn:
+        """Raise TypeError: Warp asks arguments of kernels for this, and kernels take the handle."""
+        raise TypeError("kernels take the handle of a tree, got a Scene: pass scene.tree.handle")
 
     @property
     def accuracy(self) -> str:
