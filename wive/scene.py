@@ -19,7 +19,13 @@ from wive._internal.host_arrays import host_array
 from wive._internal.known_meshes import know_again, make_known
 from wive._internal.mesh_objects import MeshObject, PlacedMeshes, mesh_arrays
 from wive._internal.moving_part import move_in_place
-from wive._internal.options import AccuracyOption, NodesOption, QualityOption
+from wive._internal.options import (
+    AccuracyOption,
+    BuildOptions,
+    NodesOption,
+    QualityOption,
+    SceneOptions,
+)
 from wive._internal.options import threads as checked_threads
 from wive._internal.point_queries import PointQueries
 from wive._internal.precision import Floats, real_of
@@ -44,7 +50,7 @@ from wive.geoms import Geoms
 from wive.meshfile import MeshSource, load_mesh
 
 if TYPE_CHECKING:
-    pass
+    from typing_extensions import Unpack
 
 
 class Scene(Queries, PointQueries, SceneFacts):
@@ -144,7 +150,7 @@ class Scene(Queries, PointQueries, SceneFacts):
         *,
         dtype: DTypeLike | None = None,
         file_type: str | None = None,
-        **kwargs: Any,
+        **kwargs: Unpack[BuildOptions],
     ) -> Scene:
         """A scene from a mesh file, read by `wive.load_mesh`; other keywords are those of `Scene`.
 
@@ -159,12 +165,14 @@ class Scene(Queries, PointQueries, SceneFacts):
             from wive.loading import from_saved, is_saved_file
 
             if is_saved_file(source):
-                return from_saved(cls, source, dtype, kwargs)
+                return from_saved(cls, source, dtype, {**kwargs})
         mesh = load_mesh(source, np.float32 if dtype is None else dtype, file_type=file_type)
         return cls(*mesh, **kwargs)
 
     @classmethod
-    def from_meshes(cls, meshes: Iterable[MeshObject | Pair] | PlacedMeshes, **kwargs: Any) -> Scene:
+    def from_meshes(
+        cls, meshes: Iterable[MeshObject | Pair] | PlacedMeshes, **kwargs: Unpack[SceneOptions]
+    ) -> Scene:
         """One scene, with one tree, over several meshes; keywords are those of `Scene`.
 
         Arguments:
@@ -191,7 +199,9 @@ class Scene(Queries, PointQueries, SceneFacts):
             raise
 
     @classmethod
-    def from_heightfield(cls, z: ArrayLike, x: ArrayLike, y: ArrayLike, **kwargs: Any) -> Scene:
+    def from_heightfield(
+        cls, z: ArrayLike, x: ArrayLike, y: ArrayLike, **kwargs: Unpack[SceneOptions]
+    ) -> Scene:
         """A scene over a grid of heights, such as a digital elevation model; keywords are those of `Scene`.
 
         Each cell between four heights is two triangles that share the diagonal from its vertex [i, j] to

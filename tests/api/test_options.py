@@ -1,10 +1,13 @@
 """An option that a scene's backend doesn't have is refused, by one rule for all of them."""
 
+import inspect
+
 import numpy as np
 import pytest
 from support.meshes import TRIANGLE
 
 import wive
+from wive._internal.options import SceneOptions
 from wive.cli import main
 
 RAYS = np.float32([[0.25, 0.25, 1]]), np.float32([[0, 0, -1]])
@@ -59,3 +62,9 @@ def test_the_command_line_refuses_threads_on_a_device(device, tmp_path, capsys):
     assert main(command) == 2
     assert capsys.readouterr().err == f"wive: error: {refusal('warp', 'threads')}\n"
     assert not (tmp_path / "hits.npz").exists()
+
+
+def test_type_checkers_know_every_option_of_a_scene_in_its_other_constructors():
+    parameters = inspect.signature(wive.Scene).parameters.values()
+    options = {parameter.name for parameter in parameters if parameter.kind == parameter.KEYWORD_ONLY}
+    assert set(SceneOptions.__annotations__) == options

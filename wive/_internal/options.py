@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 from typing import Literal, NamedTuple, TypedDict
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, DTypeLike
 
 from wive._internal.progress import ProgressOption
 from wive._internal.scalars import flag, integer, shown
@@ -24,6 +24,24 @@ HAVE_OPTION = {"threads": "CPU backends", "in_flight": "CPU backends", "lanes": 
 # More threads than this only cost memory.
 MOST_THREADS = 4096
 MOST_BYTES = 2**63 - 1
+
+
+class BuildOptions(TypedDict, total=False):
+    """The options of `Scene` that all its constructors take."""
+
+    backend: str
+    device: str | None
+    accuracy: AccuracyOption
+    nodes: NodesOption
+    quality: QualityOption
+    threads: int | None
+    progress: ProgressOption
+
+
+class SceneOptions(BuildOptions, total=False):
+    """All options of `Scene`."""
+
+    dtype: DTypeLike | None
 
 
 class QueryOptions(TypedDict, total=False):
