@@ -48,12 +48,10 @@ def in_flights(text: str) -> tuple[int, ...]:
 def scene_parser(name: str, description: str | None) -> argparse.ArgumentParser:
     """A parser with the options of every bench over scenes."""
     parser = result_parser(name, description)
-    parser.add_argument("--scenes", type=listed(), default=(), help="names of scenes")
     parser.add_argument(
-        "--scene-dir",
-        type=Path,
-        help="folder of scenes (docs/scenes.md)",
+        "--scenes", type=listed(), default=(), help="names of scenes, with commas between them"
     )
+    parser.add_argument("--scene-dir", type=Path, help="folder of scenes (docs/scenes.md)")
     return parser
 
 

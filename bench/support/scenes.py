@@ -85,7 +85,7 @@ class SceneFolder:
         named = [folder] if folder else [Path(part) for part in _environment_folders()]
         for candidate in named:
             if not (candidate / "cameras.json").is_file():
-                raise BenchError(f"no cameras.json in the scene folder {candidate}")
+                raise BenchError(f"no cameras.json in the scene folder {candidate}: docs/scenes.md has one")
         self._files: dict[str, Path] = {}
         self._cameras: dict[str, Camera] = {TERRAIN: TERRAIN_CAMERA}
         for candidate in named or DEFAULT_FOLDERS:
@@ -111,7 +111,10 @@ class SceneFolder:
         missing = [name for name in asked or usual if not self._has(name)]
         if asked and missing:
             known = ", ".join(self.names())
-            raise BenchError(f"no scene {missing[0]!r}: there are {known}, NAME_tiled_4x4 and terrain_1000k")
+            raise BenchError(
+                f"no scene {missing[0]!r}: there are {known}, NAME_tiled_4x4 and terrain_1000k; "
+                "others need a file NAME.npz and a camera in cameras.json (docs/scenes.md)"
+            )
         if missing:
             print(
                 f"missing scenes: {', '.join(missing)}\nA run without them is partial. docs/scenes.md says "
