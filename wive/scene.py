@@ -243,8 +243,8 @@ class Scene(Queries, PointQueries, SceneFacts):
     ) -> None:
         """Move the vertices: new positions, the same faces.
 
-        The tree keeps its shape and gets new boxes, in a sixth of the time that building takes. Hits are
-        those of a new scene, bit for bit (in `fast`, except of rays at edges and vertices); only
+        The tree keeps its shape and gets new boxes, in a sixth to a third of the time that building takes.
+        Hits are those of a new scene, bit for bit (in `fast`, except of rays at edges and vertices); only
         their speed depends on how well the old shape suits the new positions. It suits them well if
         the mesh bends or moves as a whole. If neighbours part, rays take more steps with every
         refit, and a new `Scene` is worth its price. Triangles that lose their area are no longer
