@@ -17,6 +17,9 @@ except ImportError as error:
         "install with `pip install .` and don't import wive from inside its source folder"
     ) from error
 
+import importlib
+from typing import TYPE_CHECKING
+
 from wive import embreex, trimesh
 from wive._internal.thread_setting import set_by_environment as _set_by_environment
 from wive._internal.thread_setting import set_threads
@@ -71,3 +74,12 @@ _set_by_environment()
 
 def __dir__() -> list[str]:
     return __all__
+
+
+if not TYPE_CHECKING:  # a type checker takes a module with __getattr__ to have every name
+
+    def __getattr__(name: str) -> object:
+        """The parts that need another package, when they are first used."""
+        if name in {"dask", "torch", "warp_kernels"}:
+            return importlib.import_module(f"wive.{name}")
+        raise AttributeError(f"module 'wive' has no attribute {name!r}")

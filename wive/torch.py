@@ -13,7 +13,10 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
-import torch
+try:
+    import torch
+except ImportError as error:
+    raise ImportError(f"wive.torch needs PyTorch ({error}): pip install torch") from error
 
 from wive._internal.options import LanesOption
 from wive.hits import Hits

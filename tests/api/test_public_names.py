@@ -3,6 +3,7 @@
 import copy
 import inspect
 import pickle
+import re
 import subprocess
 import sys
 import tempfile
@@ -39,6 +40,40 @@ def test_the_package_shows_its_public_names_alone():
     assert all(hasattr(wive, name) for name in wive.__all__)
 
 
+def run(program: str) -> str:
+    """What a Python of its own prints."""
+    finished = subprocess.run(
+        [sys.executable, "-c", program],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        cwd=tempfile.gettempdir(),
+        check=True,
+    )
+    return finished.stdout
+
+
+PARTS = {"dask": "dask", "torch": "torch", "warp_kernels": "warp"}  # and the packages that they need
+
+
+@pytest.mark.parametrize(("part", "package"), PARTS.items())
+def test_parts_that_need_another_package_are_there_without_an_import(part, package):
+    pytest.importorskip(package)
+    assert run(f"import wive; print(wive.{part}.__name__)") == f"wive.{part}\n"
+
+
+@pytest.mark.parametrize(("part", "package"), PARTS.items())
+def test_parts_say_what_to_install(part, package):
+    program = f"""
+import sys, wive
+sys.modules[{package!r}] = None
+try:
+    wive.{part}
+except ImportError as error:
+    print(error)"""
+    assert re.match(rf"wive\.{part} needs .* \(.*\): pip install ", run(program))
+
+
 @pytest.mark.parametrize(("name", "function"), functions().items(), ids=functions())
 def test_signatures_fit_on_a_screen(name, function):
     assert len(str(inspect.signature(function))) <= 5 * 80, name  # five lines of a terminal
@@ -51,15 +86,7 @@ import sys, numpy
 before = set(sys.modules)
 import wive
 print(sorted((set(sys.modules) - before) & set({slow.split()!r})))"""
-    finished = subprocess.run(
-        [sys.executable, "-c", program],
-        capture_output=True,
-        text=True,
-        timeout=60,
-        cwd=tempfile.gettempdir(),
-        check=True,
-    )
-    assert finished.stdout == "[]\n"
+    assert run(program) == "[]\n"
 
 
 def test_scenes_of_cpu_backends_do_not_look_at_the_version_of_warp(monkeypatch):
