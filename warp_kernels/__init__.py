@@ -21,13 +21,12 @@ trees, `FastBvh` for fast ones, `ExactBvh` for exact ones; in float64 scenes `Bv
 Hits are those of the C++ backends, bit for bit; on a miss t is infinity, prim -1 and u, v NaN.
 """
 
-import importlib
 from typing import TYPE_CHECKING, Any
 
-try:
-    importlib.import_module("warp")
-except ImportError as error:
-    raise ImportError(f"wive.warp_kernels needs NVIDIA Warp ({error}): pip install 'wive[warp]'") from error
+from wive._internal.devices import warp_problem
+
+if _problem := warp_problem():
+    raise ImportError(f"wive.warp_kernels needs Warp: {_problem}")
 
 from wive.warp_kernels.launching.closest_points import launch_closest_points
 from wive.warp_kernels.launching.launch import (

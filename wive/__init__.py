@@ -12,8 +12,9 @@ Tracing for Wide Vector Units", High-Performance Graphics 2017.
 try:
     from wive import _cpu as _cpu
 except ImportError as error:
+    reason = f"there is none in {__path__[0]}" if error.name == __name__ else error
     raise ImportError(
-        f"wive's compiled core can't be loaded ({error}): "
+        f"wive's compiled core can't be loaded ({reason}): "
         "install with `pip install .` and don't import wive from inside its source folder"
     ) from error
 

@@ -217,7 +217,7 @@ class Scene(Queries, PointQueries, SceneFacts):
         The scene is float64 if one of the three is an array of float64, as survey coordinates need, else
         float32. Vertex i * columns + j is z[i, j]. Triangle `prim` lies in the cell of rows i, i + 1 and
         columns j, j + 1 for i, j = divmod(prim // 2, columns - 1); even ones have vertex [i, j+1], odd ones
-        [i+1, j]. Left out cells count, too.
+        [i+1, j]. Left out cells are counted as well.
 
         Raises ValueError or TypeError, in one line naming the argument.
 

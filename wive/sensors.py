@@ -28,7 +28,7 @@ class PinholeCamera:
         pose: (4,4), camera to world; None is the identity. What OpenCV and Open3D call extrinsic is the
             inverse: np.linalg.inv(extrinsic).
 
-    There is no lens distortion: undistort the picture. `wive.render` takes this camera, too.
+    There is no lens distortion: undistort the picture. `wive.render` takes this camera as well.
 
     Raises ValueError or TypeError that names the argument.
     """

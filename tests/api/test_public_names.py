@@ -7,6 +7,7 @@ import re
 import subprocess
 import sys
 import tempfile
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -71,12 +72,27 @@ try:
     wive.{part}
 except ImportError as error:
     print(error)"""
-    assert re.match(rf"wive\.{part} needs .* \(.*\): pip install ", run(program))
+    assert re.match(rf"wive\.{part} needs .*: pip install ", run(program))
 
 
 @pytest.mark.parametrize(("name", "function"), functions().items(), ids=functions())
 def test_signatures_fit_on_a_screen(name, function):
     assert len(str(inspect.signature(function))) <= 5 * 80, name  # five lines of a terminal
+
+
+def test_a_source_folder_without_a_compiled_core_is_named(tmp_path):
+    source = Path(wive.__file__).parent
+    (tmp_path / "wive").mkdir()
+    (tmp_path / "wive" / "__init__.py").write_bytes((source / "__init__.py").read_bytes())
+    program = f"""
+import sys
+sys.path.insert(0, {str(tmp_path)!r})
+sys.meta_path[:] = [finder for finder in sys.meta_path if "editable" not in type(finder).__module__]
+try:
+    import wive
+except ImportError as error:
+    print(error)"""
+    assert f"there is none in {tmp_path / 'wive'}): install with" in run(program)
 
 
 def test_importing_the_package_imports_nothing_slow():
