@@ -118,7 +118,8 @@ class OnSurface(OnTriangles):
 
         Arguments:
             vertex_values: (v,) or (v,k) real numbers, one row per vertex of the scene: colours, temperatures,
-                smooth normals. A masked number counts as NaN.
+                smooth normals. A masked number counts as NaN. Values per triangle need no interpolation:
+                `values[hits.prim]`, of no meaning where `mask` is False.
 
         Returns (n,) or (n,k), computed in float64: float32 if the values are float16 or float32, else
         float64. On a Warp device the values are float32 or float64, or NumPy's, which are copied there.

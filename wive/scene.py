@@ -47,7 +47,7 @@ from wive._internal.stored_scenes import save_file, share, source_of
 from wive._internal.tracer import Tracer
 from wive.backend import resolve_backend
 from wive.geoms import Geoms
-from wive.meshfile import MeshSource, load_mesh
+from wive.meshfile import MeshSource, load_mesh, named_mesh
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
@@ -285,13 +285,20 @@ class Scene(Queries, PointQueries, SceneFacts):
     def save(self, path: PathLike, *, progress: ProgressOption = None) -> None:
         """Write the scene to a file that `wive.load` opens at once; the file is whole or as it was.
 
-        The file holds nodes, leaves, mesh and options, some bytes more than `memory` and the mesh, whatever
-        its name; docs/saved_scenes.md has the format. If the name ends in .npz it holds the mesh and the
-        options alone, in NumPy's format, and loading builds the tree again. `progress` is as for `Scene`, in
-        bytes, for files of trees.
+        The file holds nodes, leaves, mesh and options, some bytes more than `memory` and the mesh;
+        docs/saved_scenes.md has the format. If the name ends in .npz it holds the mesh and the options alone,
+        in NumPy's format, and loading builds the tree again. `progress` is as for `Scene`, in bytes, for
+        files of trees.
+
+        Raises ValueError if the name is that of a mesh file, such as part.ply, and OSError if the file can't
+        be written.
         """
         checked_progress(progress)
         bvh = self._bvh
+        if named_mesh(file_name(path)):
+            raise ValueError(
+                f"path must not end as mesh files do, got {file_name(path)!r}: name a saved scene .wive"
+            )
         if file_name(path).lower().endswith(".npz"):
             write_scene(path, bvh.vertices, self._faces, self._tracer.geoms, self._options)
         else:

@@ -376,8 +376,8 @@ def test_files_in_numpys_format_are_written_and_read(tmp_path):
 
 
 def test_from_file_uses_the_saved_tree_or_builds_one_as_asked(tmp_path):
-    path = tmp_path / "scene.stl"  # the content counts, not the name
-    saved(path, np.float64, "compressed", "fast")
+    saved(tmp_path / "scene.wive", np.float64, "compressed", "fast")
+    path = (tmp_path / "scene.wive").rename(tmp_path / "scene.stl")  # the content counts, not the name
     same = wive.Scene.from_file(path)
     assert same._bvh.source is not None
     assert (same.precision, same.nodes, same.accuracy) == ("float64", "compressed", "fast")

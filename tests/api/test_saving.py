@@ -36,6 +36,16 @@ def save_hits(path) -> None:
     assert main(["trace", str(folder / "mesh.npz"), str(folder / "rays.npy"), "-o", str(path)]) == 0
 
 
+def test_a_saved_scene_does_not_pass_for_a_mesh_file(tmp_path):
+    scene = wive.Scene(*TRIANGLE)
+    for name in ("part.ply", "PART.STL", "scene.glb"):
+        with pytest.raises(
+            ValueError, match=r"^path must not end as mesh files do, got .*: name a saved scene \.wive$"
+        ):
+            scene.save(tmp_path / name)
+    assert list(tmp_path.iterdir()) == []
+
+
 WRITERS = {"scene.wive": save_scene, "picture.png": save_picture, "hits.npz": save_hits}
 
 
