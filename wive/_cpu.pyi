@@ -59,6 +59,12 @@ def report_to(hears: Callable[[float], object], work: Callable[[], Result]) -> R
 def checksum(data: NDArray[np.uint8], threads: int = 0) -> int:
     """64 bits of the bytes (n,), which must be C-contiguous."""
 
+def crc32(data: NDArray[np.uint8], before: int = 0) -> int:
+    """The CRC-32 of zip archives of the bytes (n,) behind others whose CRC is `before`."""
+
+def split_rays(table: NDArray[Real], origins: NDArray[Real], directions: NDArray[Real]) -> None:
+    """Write columns 0 to 2 and 3 to 5 of the table (n,k) to two arrays (n,3)."""
+
 def expect_memory(bytes: int) -> None:
     """Raise MemoryError unless as many bytes are available; amounts under 64 MiB are not checked."""
 

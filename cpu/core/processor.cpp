@@ -34,14 +34,15 @@ std::uint32_t kept_registers() {
 }
 
 struct Processor {
-    bool avx2 = false, avx512 = false;
+    bool avx2 = false, avx512 = false, clmul = false;
 
     Processor() {
         // Intel's Software Developer's Manual, volume 2, CPUID, and AMD's volume 3, appendix E.
-        constexpr int fma = 12, popcnt = 23, osxsave = 27, lzcnt = 5;                       // words c
+        constexpr int clmul_bit = 1, fma = 12, popcnt = 23, osxsave = 27, lzcnt = 5;        // words c
         constexpr int bmi1 = 3, avx2_bit = 5, bmi2 = 8, f = 16, dq = 17, bw = 30, vl = 31;  // word b of leaf 7
         constexpr int xmm = 1, ymm = 2;                                                     // XCR0
         const std::uint32_t basic = cpuid(1).c, more = cpuid(7).b, extended = cpuid(0x80000001u).c;
+        clmul = has_all(basic, clmul_bit);
         if (!has_all(basic, osxsave)) return;
         const std::uint32_t kept = kept_registers();
         avx2 = has_all(basic, fma, popcnt) && has_all(more, avx2_bit, bmi1, bmi2) && has_all(extended, lzcnt) &&
@@ -57,7 +58,7 @@ struct Processor {
 };
 #else
 struct Processor {
-    bool avx2 = false, avx512 = false;
+    bool avx2 = false, avx512 = false, clmul = false;
 };
 #endif
 
@@ -71,5 +72,6 @@ const Processor& processor() {
 
 bool has_avx2() { return processor().avx2; }
 bool has_avx512() { return processor().avx512; }
+bool has_clmul() { return processor().clmul; }
 
 }  // namespace wive

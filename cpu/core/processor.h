@@ -7,5 +7,7 @@ namespace wive {
 bool has_avx2();
 // F, VL, DQ and BW, with all that has_avx2() asks for.
 bool has_avx512();
+// Carry-less multiplication of SSE registers.
+bool has_clmul();
 
 }  // namespace wive

@@ -326,5 +326,6 @@ PYBIND11_MODULE(_cpu, m, pybind11::mod_gil_not_used()) {
     bind_segments(m);
     bind_distant(m);
     bind_stored(m, bvh);
+    bind_streams(m);
     bind_parts(m, bvh);
 }

@@ -262,8 +262,8 @@ using PyBvhClass = py::class_<PyBvh>;
 
 // Defined in bindings_queries.cpp: ray queries. In bindings_surface.cpp: points and normals of hits. In
 // bindings_closest.cpp: closest points. In bindings_spawn.cpp: spawned rays. In bindings_segments.cpp: line of sight.
-// In bindings_distant.cpp: rays from far away. In bindings_stored.cpp: stored trees. In bindings_parts.cpp: single
-// meshes that move.
+// In bindings_distant.cpp: rays from far away. In bindings_stored.cpp: stored trees. In bindings_streams.cpp:
+// rays and checksums of streams. In bindings_parts.cpp: single meshes that move.
 void bind_queries(PyBvhClass& bvh);
 void bind_closest(py::module_& m, PyBvhClass& bvh);
 void bind_surface(py::module_& m);
@@ -271,6 +271,7 @@ void bind_spawn(py::module_& m);
 void bind_segments(py::module_& m);
 void bind_distant(py::module_& m);
 void bind_stored(py::module_& m, PyBvhClass& bvh);
+void bind_streams(py::module_& m);
 void bind_parts(py::module_& m, PyBvhClass& bvh);
 
 // The options of a tree by their names; std::invalid_argument for others. In bindings.cpp.

@@ -160,3 +160,28 @@ def test_a_large_array_is_read_whole(tmp_path, order):
     np.save(tmp_path / "rays.npy", array)
     with open_npy_or_npz(tmp_path / "rays.npy", "a file of rays") as read:
         assert isinstance(read, FileRows) and (read.read(len(array)) == array).all()
+
+
+@pytest.mark.parametrize("method", [zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED])
+def test_an_archive_behind_other_bytes_is_read(tmp_path, method):
+    rays = np.random.default_rng(2).random((1000, 3), np.float32)
+    data = npz(method, origins=npy(rays), directions=npy(rays[::-1]))
+    (tmp_path / "rays.npz").write_bytes(b"#!/bin/sh\n" * 10 + data)
+    with open_npy_or_npz(tmp_path / "rays.npz", "a file of rays") as read:
+        rows = read.rows("directions")
+        rows.skip(10)
+        np.testing.assert_array_equal(rows.read(990), rays[::-1][10:])
+        rows.close()
+        np.testing.assert_array_equal(read["origins"], rays)
+
+
+def test_what_is_skipped_counts_in_the_checksum(tmp_path):
+    data = bytearray(npz(origins=npy(np.ones((100_000, 3)))))
+    data[1000] ^= 1
+    (tmp_path / "rays.npz").write_bytes(data)
+    with open_npy_or_npz(tmp_path / "rays.npz", "a file of rays") as read:
+        rows = read.rows("origins")
+        rows.skip(99_999)
+        with pytest.raises(ValueError, match=r"rays\.npz: not a file of rays, or damaged .*CRC"):
+            rows.read(1)
+        rows.close()

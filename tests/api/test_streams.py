@@ -164,8 +164,9 @@ def test_files_that_hold_no_rays_are_refused_by_name(tmp_path):
         assert file in str(error.value) and "\n" not in str(error.value)
 
 
-def test_damage_of_a_deflated_file_is_found_by_its_end(tmp_path):
-    name, _ = write_rays("deflated", tmp_path, some_rays())
+@pytest.mark.parametrize("form", ["npz", "deflated"])
+def test_damage_of_an_archive_is_found_by_its_end(tmp_path, form):
+    name, _ = write_rays(form, tmp_path, some_rays())
     data = bytearray(name.read_bytes())
     data[len(data) // 4] ^= 1
     name.write_bytes(data)

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from wive import _cpu
 from wive._internal.npz_layout import NPY_HEAD, NpzLayout, Stored, joined_crc, npy_head
 
 COPIED = 1 << 18
@@ -93,7 +94,7 @@ class HitColumns:
             place = self._begins[column.name] + row * column.row
             _write_at(self._files[column.name], memoryview(data), place)
             if crcs:
-                crcs[column.name] = zlib.crc32(data, crcs[column.name])
+                crcs[column.name] = _cpu.crc32(data, crcs[column.name])
             if column.name not in self._beside:
                 written += len(data)
         return crcs, written

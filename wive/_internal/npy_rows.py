@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 
 # A header is some 100 bytes; NumPy refuses one over 10,000 of its own accord.
 MOST_HEADER = 1 << 15
-CHUNK = 1 << 20
+# Bytes that are read at once: few enough to be still in a cache when they are summed up.
+CHUNK = 1 << 18
 
 
 @runtime_checkable

@@ -214,6 +214,7 @@ def _of_table(rows: Rows, names: Sequence[str]) -> RayReader:
     vectors = [[places[name] for name in NAMES[:3]], [places[name] for name in NAMES[3:6]]]
     dtype = rows.dtype.newbyteorder("=")
     step = max(1, BLOCK // (rows.dtype.itemsize * len(names)))
+    is_usual = tuple(names[:6]) == NAMES[:6] and dtype in (np.float32, np.float64)
 
     def taken(count: int, checksums: list[RunningChecksum]) -> Rays:
         split = [np.empty((count, 3), dtype) for _ in vectors]
@@ -223,9 +224,12 @@ def _of_table(rows: Rows, names: Sequence[str]) -> RayReader:
             for checksum in checksums:
                 checksum.add(table)
             place = slice(begin, begin + len(table))
-            for whole, columns in zip(split, vectors, strict=True):
-                for axis, column in enumerate(columns):  # numbers one by one: NumPy is slow on short rows
-                    whole[place, axis] = table[:, column]
+            if is_usual:
+                _cpu.split_rays(np.ascontiguousarray(table, dtype), split[0][place], split[1][place])
+            else:
+                for whole, columns in zip(split, vectors, strict=True):
+                    for axis, column in enumerate(columns):  # numbers one by one: NumPy is slow on short rows
+                        whole[place, axis] = table[:, column]
             for limit, name in zip(limits, NAMES[6:], strict=True):
                 if limit is not None:
                     limit[place] = table[:, places[name]]
