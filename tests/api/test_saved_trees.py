@@ -490,6 +490,21 @@ def test_a_scene_of_a_file_pickles_as_its_place(tmp_path):
     assert len(pickle.dumps(scene)) > 10_000
 
 
+def test_pickles_of_one_path_find_the_tree_that_they_were_made_of(tmp_path):
+    path = tmp_path / "scene"
+    saved(path, count=1000)
+    old = wive.load(path)
+    wive.Scene(*sphere(1)).save(path)
+    new = wive.load(path)
+    pickles = pickle.dumps(old), pickle.dumps(new)
+    assert [pickle.loads(data)._bvh for data in pickles] == [old._bvh, new._bvh]
+    del old
+    gc.collect()  # now only the new file's tree is held, and at its path
+    with pytest.raises(ValueError, match="has changed since the scene was pickled"):
+        pickle.loads(pickles[0])
+    assert pickle.loads(pickles[1])._bvh is new._bvh
+
+
 def test_a_pickle_of_a_file_that_changed_or_went_is_refused(tmp_path):
     path = tmp_path / "scene"
     whole = saved(path, count=1000)
