@@ -4,6 +4,7 @@
 device that can't be used ends the run with the reason. The default is Warp's CPU device.
 """
 
+import importlib.util
 import os
 import sys
 from collections.abc import Callable, Iterator
@@ -19,6 +20,9 @@ from wive._internal import devices
 # For tests of `bench`; last, so that the installed wive comes before its source folder.
 sys.path.append(str(Path(__file__).resolve().parents[1]))
 
+# Where NVIDIA's Warp is not installed, `import warp` would find the folder of its tests.
+if (found := importlib.util.find_spec("warp")) is not None and found.origin is None:
+    sys.modules["warp"] = None  # type: ignore[assignment]
 BACKENDS = wive.backends()
 
 DEVICE = pytest.StashKey[str]()
