@@ -326,9 +326,16 @@ def closest_on(
     """(n,3) the closest point of triangle prim[i] to points[i], (n,) distances; NaN, inf without one."""
 
 def surface_points(
-    vertices: NDArray[Real], faces: NDArray[np.int32], prim: NDArray[np.int32], uv: NDArray[Real]
+    vertices: NDArray[Real],
+    faces: NDArray[np.int32],
+    prim: NDArray[np.int32],
+    uv: NDArray[Real],
+    kernel: str = "",
 ) -> NDArray[np.float64]:
-    """(n,3) points at uv (n,2) of triangles prim (n,), in double; NaN if there is no such triangle."""
+    """(n,3) points at uv (n,2) of triangles prim (n,), in double; NaN if there is no such triangle.
+
+    kernel: a name of `kernels()`, or "" for the best. The interpreter lock is released.
+    """
 
 def points_on_rays(
     vertices: NDArray[np.float64],
@@ -342,9 +349,12 @@ def points_on_rays(
     """(n,3) points where rays ray (n,) meet the planes of triangles prim (n,); at uv if they graze it."""
 
 def surface_normals(
-    vertices: NDArray[Real], faces: NDArray[np.int32], prim: NDArray[np.int32]
+    vertices: NDArray[Real], faces: NDArray[np.int32], prim: NDArray[np.int32], kernel: str = ""
 ) -> NDArray[np.float64]:
-    """(n,3) unit normals of triangles prim (n,), in double; NaN if there is no such triangle."""
+    """(n,3) unit normals of triangles prim (n,), in double; NaN if there is no such triangle.
+
+    kernel: a name of `kernels()`, or "" for the best. The interpreter lock is released.
+    """
 
 def error_bounds(
     vertices: NDArray[Real],
@@ -354,10 +364,12 @@ def error_bounds(
     origins: NDArray[Real],
     directions: NDArray[Real],
     constants: Sequence[float],
+    kernel: str = "",
 ) -> NDArray[np.float64]:
     """(n,) bounds on the error of t (n,), for rays (n,3) that hit triangles prim (n,); NaN for no triangle.
 
-    constants: the members of ErrorBound (cpu/core/error_bound.inc). The interpreter lock is released.
+    constants: the members of ErrorBound (cpu/core/error_bound.inc). kernel: a name of `kernels()`, or ""
+    for the best. The interpreter lock is released.
     """
 
 def spawn_origins(
@@ -368,11 +380,12 @@ def spawn_origins(
     directions: NDArray[Real],
     accuracy: int,
     constants: Sequence[float],
+    kernel: str = "",
 ) -> NDArray[Any]:
     """(n,3) origins for directions (n,3) at uv (n,2) of triangles prim (n,); NaN for no triangle.
 
-    accuracy and constants: the members of SpawnOrigin (cpu/core/spawn.inc) other than is_float. The
-    interpreter lock is released.
+    accuracy and constants: the members of SpawnOrigin (cpu/core/spawn.inc) other than is_float. kernel: a
+    name of `kernels()`, or "" for the best. The interpreter lock is released.
     """
 
 def segment_rays(

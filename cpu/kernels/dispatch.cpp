@@ -73,4 +73,6 @@ template const KernelTable<double>& find_kernels(std::string_view);
 
 IsaName find_isa(std::string_view name) { return find_entry(name).isa; }
 
+IsaName best_isa() { return has_avx512() ? IsaName::avx512 : has_avx2() ? IsaName::avx2 : IsaName::scalar; }
+
 }  // namespace wive

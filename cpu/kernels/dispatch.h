@@ -21,5 +21,7 @@ const KernelTable<Real>& find_kernels(std::string_view name);
 
 // The instruction set of a kernel name. Throws as find_kernels does.
 IsaName find_isa(std::string_view name);
+// The best one that this machine can run.
+IsaName best_isa();
 
 }  // namespace wive

@@ -322,7 +322,6 @@ PYBIND11_MODULE(_cpu, m, pybind11::mod_gil_not_used()) {
     bind_queries(bvh);
     bind_closest(m, bvh);
     bind_surface(m);
-    bind_spawn(m);
     bind_segments(m);
     bind_distant(m);
     bind_stored(m, bvh);

@@ -267,7 +267,6 @@ using PyBvhClass = py::class_<PyBvh>;
 void bind_queries(PyBvhClass& bvh);
 void bind_closest(py::module_& m, PyBvhClass& bvh);
 void bind_surface(py::module_& m);
-void bind_spawn(py::module_& m);
 void bind_segments(py::module_& m);
 void bind_distant(py::module_& m);
 void bind_stored(py::module_& m, PyBvhClass& bvh);

@@ -1,9 +1,11 @@
-// Points, normals and error bounds of hits, computed anew by each call.
+// Points, normals and error bounds of hits and origins of rays that leave from there, computed anew by each call.
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
 
+#include "kernels/dispatch.h"
+#include "kernels/surface_kernels.h"
 #include "python/bindings.h"
 #include "python/each_hit.h"
 #include "surface_source.h"
@@ -14,50 +16,73 @@ namespace {
 // clang-format off
 #include "core/number.inc"
 #include "core/double3.inc"
-#include "core/error_bound.inc"
+#include "core/facet.inc"
 // clang-format on
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 
-double on_triangle(TriangleCorners corner, double u, double v, int axis) {
-    return (1 - u - v) * corner[0][axis] + u * corner[1][axis] + v * corner[2][axis];
+// The kernels of that name, or if it is empty the best.
+template <class Real>
+const SurfaceKernels<Real>& kernels_of(const std::string& name) {
+    return *find_surface_kernels<Real>(name.empty() ? best_isa() : find_isa(name));
 }
 
-// (v1 - v0) x (v2 - v0), along one axis.
-double normal_along(TriangleCorners corner, int axis) {
-    const int i = (axis + 1) % 3, j = (axis + 2) % 3;
-    return (corner[1][i] - corner[0][i]) * (corner[2][j] - corner[0][j]) -
-           (corner[1][j] - corner[0][j]) * (corner[2][i] - corner[0][i]);
+template <class Call>
+void run(void (*kernel)(const Call&, std::size_t, std::size_t), const Call& call) {
+    for_each_chunk(call.triangles.size, 0, [&](std::size_t begin, std::size_t end) { kernel(call, begin, end); });
 }
 
 template <class Real>
 py::array_t<double> points(const Array<Real>& vertices, const Array<std::int32_t>& faces,
-                           const Array<std::int32_t>& prim, const Array<Real>& uv) {
+                           const Array<std::int32_t>& prim, const Array<Real>& uv, const std::string& kernel) {
     expect_rows(uv, 2, prim, "uv: expected shape (n, 2), n as prim has");
-    const Real* weights = uv.data();
     auto answer = make_rows<double>(prim.size());
-    double* out = answer.mutable_data();
-    for_each_hit(vertices, faces, prim, [=](std::size_t i, TriangleCorners corner) {
-        const double u = weights[2 * i], v = weights[2 * i + 1];
-        for (int axis = 0; axis < 3; ++axis) out[3 * i + axis] = corner ? on_triangle(corner, u, v, axis) : nan;
-    });
+    const PointsCall<Real> call = {hit_triangles(vertices, faces, prim), uv.data(), answer.mutable_data()};
+    run(kernels_of<Real>(kernel).points, call);
     return answer;
 }
 
 template <class Real>
 py::array_t<double> normals(const Array<Real>& vertices, const Array<std::int32_t>& faces,
-                            const Array<std::int32_t>& prim) {
+                            const Array<std::int32_t>& prim, const std::string& kernel) {
     auto answer = make_rows<double>(prim.size());
-    double* out = answer.mutable_data();
-    for_each_hit(vertices, faces, prim, [=](std::size_t i, TriangleCorners corner) {
-        if (!corner) {
-            std::fill_n(out + 3 * i, 3, nan);
-            return;
-        }
-        const double across[3] = {normal_along(corner, 0), normal_along(corner, 1), normal_along(corner, 2)};
-        const double length = std::sqrt(across[0] * across[0] + across[1] * across[1] + across[2] * across[2]);
-        for (int axis = 0; axis < 3; ++axis) out[3 * i + axis] = across[axis] / length;
-    });
+    const NormalsCall<Real> call = {hit_triangles(vertices, faces, prim), answer.mutable_data()};
+    run(kernels_of<Real>(kernel).normals, call);
+    return answer;
+}
+
+// constants: the members of ErrorBound.
+template <class Real>
+py::array_t<double> error_bounds(const Array<Real>& vertices, const Array<std::int32_t>& faces,
+                                 const Array<std::int32_t>& prim, const Array<Real>& t, const Array<Real>& origins,
+                                 const Array<Real>& directions, const std::array<double, 3>& constants,
+                                 const std::string& kernel) {
+    expect(t.size() == prim.size(), "t: expected as many as prim");
+    expect_rows(origins, 3, prim, "origins: expected shape (n, 3), n as prim has");
+    expect_rows(directions, 3, prim, "directions: expected shape (n, 3), n as prim has");
+    expect_memory(sizeof(double) * static_cast<std::size_t>(prim.size()));
+    auto answer = new_array<double>({prim.size()});
+    const ErrorBoundsCall<Real> call = {hit_triangles(vertices, faces, prim),
+                                        t.data(),
+                                        origins.data(),
+                                        directions.data(),
+                                        constants,
+                                        answer.mutable_data()};
+    run(kernels_of<Real>(kernel).error_bounds, call);
+    return answer;
+}
+
+// constants: the members of SpawnOrigin from point_error on.
+template <class Real>
+py::array_t<Real> spawn_origins(const Array<Real>& vertices, const Array<std::int32_t>& faces,
+                                const Array<std::int32_t>& prim, const Array<Real>& uv, const Array<Real>& directions,
+                                int accuracy, const std::array<double, 8>& constants, const std::string& kernel) {
+    expect_rows(uv, 2, prim, "uv: expected shape (n, 2), n as prim has");
+    expect_rows(directions, 3, prim, "directions: expected shape (n, 3), n as prim has");
+    auto answer = make_rows<Real>(prim.size());
+    const SpawnCall<Real> call = {hit_triangles(vertices, faces, prim), uv.data(), directions.data(),
+                                  static_cast<Accuracy>(accuracy),      constants, answer.mutable_data()};
+    run(kernels_of<Real>(kernel).spawn, call);
     return answer;
 }
 
@@ -87,41 +112,15 @@ py::array_t<double> points_on_rays(const Array<double>& vertices, const Array<st
             std::fill_n(out, 3, nan);
             return;
         }
-        const double *o = from + 3 * index, *d = along + 3 * index;
-        double slope = 0, height = 0, area = 0, length = 0;
-        for (int axis = 0; axis < 3; ++axis) {
-            const double across = normal_along(corner, axis);
-            slope += across * d[axis];
-            height += across * (corner[0][axis] - o[axis]);
-            area += across * across;
-            length += d[axis] * d[axis];
-        }
-        const double u = weights[2 * i], v = weights[2 * i + 1], t = height / slope;
+        const Double3 origin = Double3::load(from + 3 * index), direction = Double3::load(along + 3 * index);
+        const Double3 normal = Facet::normal(corner);
+        const double slope = Double3::dot(normal, direction);
+        const double height = Double3::dot(normal, Double3::load(corner[0]) - origin);
+        const double area = Double3::dot(normal, normal), length = Double3::dot(direction, direction);
         const bool steep = std::abs(slope) > grazing * std::sqrt(area) * std::sqrt(length);
-        for (int axis = 0; axis < 3; ++axis)
-            out[axis] = steep ? o[axis] + t * d[axis] : on_triangle(corner, u, v, axis);
-    });
-    return answer;
-}
-
-// constants: the members of ErrorBound.
-template <class Real>
-py::array_t<double> error_bounds(const Array<Real>& vertices, const Array<std::int32_t>& faces,
-                                 const Array<std::int32_t>& prim, const Array<Real>& t, const Array<Real>& origins,
-                                 const Array<Real>& directions, const std::array<double, 3>& constants) {
-    expect(t.size() == prim.size(), "t: expected as many as prim");
-    expect_rows(origins, 3, prim, "origins: expected shape (n, 3), n as prim has");
-    expect_rows(directions, 3, prim, "directions: expected shape (n, 3), n as prim has");
-    const auto [rounding, margin, underflow] = constants;
-    const ErrorBound error = {rounding, margin, underflow};
-    const Real *distances = t.data(), *from = origins.data(), *along = directions.data();
-    expect_memory(sizeof(double) * static_cast<std::size_t>(prim.size()));
-    auto answer = new_array<double>({prim.size()});
-    double* out = answer.mutable_data();
-    for_each_hit(vertices, faces, prim, [=](std::size_t i, TriangleCorners corner) {
-        const double origin[3] = {from[3 * i], from[3 * i + 1], from[3 * i + 2]};
-        const double direction[3] = {along[3 * i], along[3 * i + 1], along[3 * i + 2]};
-        out[i] = corner ? error.bound(corner, distances[i], origin, direction) : nan;
+        const Double3 point =
+            steep ? origin + direction * (height / slope) : Facet::point(corner, weights[2 * i], weights[2 * i + 1]);
+        point.store(out);
     });
     return answer;
 }
@@ -133,12 +132,17 @@ void bind_surface(py::module_& m) {
     m.attr("distance_source") = distance_source;
     for_each_precision([&]<class Real>(Real) {
         m.def("surface_points", &points<Real>, array_arg("vertices"), array_arg("faces"), array_arg("prim"),
-              array_arg("uv"));
+              array_arg("uv"), py::arg("kernel") = "");
         m.def("points_on_rays", &points_on_rays<Real>, array_arg("vertices"), array_arg("faces"), array_arg("prim"),
               array_arg("uv"), array_arg("ray"), array_arg("origins"), array_arg("directions"));
-        m.def("surface_normals", &normals<Real>, array_arg("vertices"), array_arg("faces"), array_arg("prim"));
+        m.def("surface_normals", &normals<Real>, array_arg("vertices"), array_arg("faces"), array_arg("prim"),
+              py::arg("kernel") = "");
         m.def("error_bounds", &error_bounds<Real>, array_arg("vertices"), array_arg("faces"), array_arg("prim"),
-              array_arg("t"), array_arg("origins"), array_arg("directions"), py::arg("constants"));
+              array_arg("t"), array_arg("origins"), array_arg("directions"), py::arg("constants"),
+              py::arg("kernel") = "");
+        m.def("spawn_origins", &spawn_origins<Real>, array_arg("vertices"), array_arg("faces"), array_arg("prim"),
+              array_arg("uv"), array_arg("directions"), py::arg("accuracy"), py::arg("constants"),
+              py::arg("kernel") = "");
     });
 }
 
