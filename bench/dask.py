@@ -2,7 +2,7 @@
 
 20 million incoherent rays, origins uniform in the scene's box, lie ready in memory before the time is taken:
 of the process, or of the workers, which keep the hits. `speed`: seconds of one call of `Scene.intersect` on
-two threads over those of dask, in turn. Chunks have a million rays. Workers map a saved scene. `task_ms` is
+two threads over those of dask, in turn. Chunks have five million rays. Workers map a saved scene. `task_ms` is
 what dask takes per task on two processes, from chunks of one ray.
 """
 
@@ -24,7 +24,7 @@ from bench.support.scenes import TERRAIN, SceneFolder
 from bench.support.timing import QUICK, Effort, compare_in_turn, wall_timed
 
 CORES = 2
-RAYS, CHUNK = 20_000_000, 1_000_000
+RAYS, CHUNK = 20_000_000, 5_000_000
 QUICK_RAYS, QUICK_CHUNK = 20_000, 2_000
 TASKS, QUICK_TASKS = 2_000, 50
 EFFORT = Effort(least=3, most=3)
