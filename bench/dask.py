@@ -27,7 +27,7 @@ CORES = 2
 RAYS, CHUNK = 20_000_000, 5_000_000
 QUICK_RAYS, QUICK_CHUNK = 20_000, 2_000
 TASKS, QUICK_TASKS = 2_000, 50
-EFFORT = Effort(least=3, most=3)
+EFFORT = Effort(least=9, most=9)
 FAR = 1e30  # tmax, another one per run: dask keeps what it has computed
 CALL, THREADS, PROCESSES = "Scene.intersect", "wive.dask, threads", "wive.dask, processes"
 COLUMNS = ["scene", "triangles", "contender", "count", "speed", "low", "high", "mrays", "rounds"]
