@@ -156,7 +156,8 @@ def test_saving_and_loading_tell_how_far_they_are(tmp_path, name):
     assert name.endswith(".npz") or told[-1][0] == told[-1][1] > 0
     for load in (wive.load, wive.Scene.from_file):
         assert len(load(tmp_path / name, progress=hear)) == len(SCENE)
-    assert name.endswith(".wive") or told == 2 * [(len(SCENE), len(SCENE))]
+    ends = [pair for pair in told if pair[0] == pair[1]]  # before these, a slow machine tells more
+    assert name.endswith(".wive") or ends == 2 * [(len(SCENE), len(SCENE))]
 
 
 def test_a_save_that_is_stopped_leaves_no_file(tmp_path, monkeypatch):
