@@ -2,8 +2,8 @@
 
 20 million incoherent rays, origins uniform in the scene's box, lie ready in memory before the time is taken:
 of the process, or of the workers, which keep the hits. `speed`: seconds of one call of `Scene.intersect` on
-two threads over those of dask, in turn. Chunks have five million rays. Workers map a saved scene. `task_ms` is
-what dask takes per task on two processes, from chunks of one ray.
+two threads over those of dask, in turn. Chunks have five million rays. Workers map a saved scene. `task_ms`
+is what dask takes per task on two processes, from chunks of one ray.
 """
 
 import argparse

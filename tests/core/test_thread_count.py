@@ -4,6 +4,7 @@ import os
 import subprocess
 import sys
 import threading
+import time
 from pathlib import Path
 
 import numpy as np
@@ -95,10 +96,13 @@ def test_calls_at_once_share_the_cores() -> None:
 
     other = threading.Thread(target=trace)
     other.start()
-    fewest = min(_cpu.thread_count() for _ in range(200_000))
-    ended.set()
-    other.join()
-    assert fewest == 1
+    try:
+        deadline = time.monotonic() + 60
+        while _cpu.thread_count() > 1:
+            assert time.monotonic() < deadline
+    finally:
+        ended.set()
+        other.join()
     assert _cpu.thread_count() == _cpu.usable_cores()
 
 

@@ -66,7 +66,7 @@ def write_png(path: PathLike, image: Image, srgb: bool = True) -> None:
         file.write(content)
 
 
-def png_bytes(image: Image, srgb: bool = True) -> memoryview:
+def png_bytes(image: Image, srgb: bool = True) -> bytes:
     """The content of a PNG file."""
     pillow = _imported(".png", *PILLOW)
     levels = np.empty(image.shape, np.uint8)
@@ -76,7 +76,7 @@ def png_bytes(image: Image, srgb: bool = True) -> memoryview:
         row[:] = (_encoded(within) if srgb and image.ndim == 3 else within) * 255 + 0.5
     content = io.BytesIO()
     pillow.fromarray(levels).save(content, format="PNG", optimize=True)
-    return content.getbuffer()
+    return content.getvalue()
 
 
 def _encoded(linear: Image) -> Image:
@@ -116,7 +116,7 @@ def _write_tiff(name: str, image: Image, srgb: bool) -> None:
     content = io.BytesIO()  # the library asks files for their names
     tifffile.imwrite(content, image, photometric=kind, software="wive")
     with atomic_write(name) as file:
-        file.write(content.getbuffer())
+        file.write(content.getvalue())
 
 
 def _write_npy(name: str, image: Image, srgb: bool) -> None:
