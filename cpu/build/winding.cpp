@@ -6,6 +6,8 @@
 #include <limits>
 #include <numbers>
 
+#include "core/poll.h"
+
 namespace wive {
 namespace {
 
@@ -116,6 +118,7 @@ auto WindingTable<Real>::gather(const BvhView& view, std::uint32_t reference) ->
 template <class Real>
 template <class Form>
 auto WindingTable<Real>::gather_node(const BvhView& view, std::uint32_t reference) -> Child {
+    poll_caller();
     const typename Form::Node& from = view.node<Form>(reference);
     Child all;
     all.number = static_cast<std::int32_t>(nodes_.size());

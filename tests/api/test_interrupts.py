@@ -59,10 +59,11 @@ def calls(slow: tuple[wive.Scene, np.ndarray, np.ndarray]) -> dict[str, Callable
         "intersect_all": partial(scene.intersect_all, origins, directions),
         "closest": partial(scene.closest, np.tile(origins + np.float32([0, 0, 50]), (5, 1))),
         "Scene": partial(wive.Scene, vertices, faces, quality="high"),
+        "first winding number": partial(wive.Scene(vertices, faces).contains, vertices[:1], sign="winding"),
     }
 
 
-@pytest.mark.parametrize("name", ["intersect", "Scene"])
+@pytest.mark.parametrize("name", ["intersect", "Scene", "first winding number"])
 def test_signals_are_handled_meanwhile(calls: dict[str, Callable[[], object]], name: str) -> None:
     """Without that, one call takes any number of signals for one, after its end."""
     ticks: list[int] = []
