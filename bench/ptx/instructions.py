@@ -92,6 +92,8 @@ def rule_of(opcode: str) -> tuple[Rule, str]:
         return Rule(f"{product} + {{c}}", ("", "", wide), result=wide), kind
     if stem.startswith("setp.") and stem[5:] in COMPARISONS:
         return Rule(COMPARISONS[stem[5:]], result="pred"), kind
+    if stem.startswith("setp.") and stem.endswith(".or") and stem[5:-3] in COMPARISONS:
+        return Rule(f"({COMPARISONS[stem[5:-3]]}) || {{c}}", ("", "", "pred"), result="pred"), kind
     conversion = _conversion(opcode)
     if conversion is None:
         raise ValueError(f"PTX: unknown instruction {opcode}")

@@ -22,6 +22,7 @@ SPECIAL = {
     "%ntid.x": "block.threads",
     "%ctaid.x": "block.index",
     "%nctaid.x": "block.count",
+    "%lanemask_lt": "((1u << lane_index()) - 1u)",
     **{f"%{name}.{axis}": "0u" for name in ("tid", "ctaid") for axis in "yz"},
     **{f"%{name}.{axis}": "1u" for name in ("ntid", "nctaid") for axis in "yz"},
 }

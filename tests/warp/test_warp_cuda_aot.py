@@ -84,12 +84,12 @@ DOUBLE_REGISTERS = {
     ("watertight", 1): 112,
 }
 # Bytes: a thread that owns its stack holds a child and, for the closest hit, a distance per entry, and up to
-# 26 words of the ray behind them, whose parts begin at even words. A group's stack is in shared memory.
+# 28 words of the ray behind them, whose parts begin at even words. A group's stack is in shared memory.
 STACK_BYTES = {
-    "closest": STACK * 8 + 104,
-    "any": STACK * 4 + 104,
-    "count": STACK * 4 + 104,
-    "all": STACK * 4 + 104,
+    "closest": STACK * 8 + 112,
+    "any": STACK * 4 + 112,
+    "count": STACK * 4 + 112,
+    "all": STACK * 4 + 112,
 }
 DOUBLE_STACK_BYTES = 64  # more: rays are kept in double
 EXACT_STACK_BYTES = 9 * 1024  # integers of the exact test, of two triangles if hits are compared

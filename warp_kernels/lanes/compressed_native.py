@@ -74,11 +74,13 @@ BYTE_DISTANCES_1 = f"""
 # `longest`. `numbers` holds the vertex numbers of four triangles; for one alone, that of triangle `lane`
 # is taken.
 _CORNERS = f"""
-    enum {{ BITS = {NUMBER_BITS}, WORDS = {VERTEX_WORDS} }};
+    // Bytes of a vertex are a power of two: a number that is shifted once says where its vertex begins.
+    enum {{ BITS = {NUMBER_BITS}, SHIFT = {(4 * VERTEX_WORDS).bit_length() - 1} }};
+    const char* const vertices = (const char*)((const float*)units + block);
     wp::vec_t<3 * LENGTH, wp::float32> corners;
     for (int i = 0; i < LENGTH; ++i) {{
         const int triangle = LENGTH == 1 ? lane & 3 : i;
-        const float* from = (const float*)units + block + WORDS * (numbers >> BITS * triangle & 7u);
+        const float* from = (const float*)(vertices + (numbers << SHIFT >> BITS * triangle & 7u << SHIFT));
 #if defined(__CUDA_ARCH__)
         {load_16("f32", "from")}
         corners[i] = longest == 0 ? words[1] : longest == 1 ? words[2] : words[0];

@@ -15,6 +15,7 @@ from types import SimpleNamespace
 
 import warp as wp
 
+from wive.warp_kernels.lanes.layout import CORNER_WORDS
 from wive.warp_kernels.lanes.native import (
     BYTE_OF,
     DISTANCES_1,
@@ -67,31 +68,6 @@ def load_float(units: wp.uint64, at: int) -> float:
 """)
 def load_double(units: wp.uint64, at: int) -> wp.float64:
     """The number stored in two words of the tree."""
-    ...
-
-
-@wp.func_native("""
-#if defined(__CUDA_ARCH__)
-    return __ldg((const float*)units + at + word);
-#else
-    return ((const float*)units)[at + word];
-#endif
-""")
-def load_float_behind(units: wp.uint64, at: int, word: int) -> float:
-    """The word that lies `word` words behind another: several behind one share the address of that."""
-    ...
-
-
-@wp.func_native("""
-    const double* number = (const double*)((const float*)units + at + word);
-#if defined(__CUDA_ARCH__)
-    return __ldg(number);
-#else
-    return *number;
-#endif
-""")
-def load_double_behind(units: wp.uint64, at: int, word: int) -> wp.float64:
-    """As `load_float_behind`, of two words."""
     ...
 
 
@@ -161,15 +137,15 @@ def lanes_of(length: int, stack_words: int, precision: str) -> SimpleNamespace:
     if eight:
 
         @wp.func_native(TRIANGLES_4 if precision == "float32" else DOUBLE_TRIANGLES_4)
-        def load_triangles(units: wp.uint64, at: int, word: int, lane: int) -> triangles: ...
+        def load_triangles(row: wp.uint64, k: int) -> triangles: ...
     else:
         # Native code here makes NVRTC peel the loop over a leaf's blocks: six registers more on sm_100.
         load_number = load_float if precision == "float32" else load_double
-        number_words: int = 1 if precision == "float32" else 2
+        corner_words: int = CORNER_WORDS * (1 if precision == "float32" else 2)
 
         @wp.func
-        def load_triangles(units: wp.uint64, at: int, word: int, lane: int):
-            return triangles(load_number(units, at + word + number_words * (lane & 3)))
+        def load_triangles(row: wp.uint64, k: int):
+            return triangles(load_number(row, corner_words * k))
 
     @wp.func_native(
         PRODUCTS.replace("LENGTH", str(triangles_length))

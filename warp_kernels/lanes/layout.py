@@ -36,6 +36,7 @@ CORE_COMPRESSED_ORDER_BITS = 3
 # two words, and the block is padded to a multiple of 32 bytes.
 BLOCK_WIDTH = 4
 BLOCK_WORDS = 40
+CORNER_WORDS = 3 * BLOCK_WIDTH  # from a corner's rows to the next one's, if numbers take one word
 PRIM_ROW = 9 * BLOCK_WIDTH
 MAX_LEAF_BLOCKS = 8
 

@@ -3,6 +3,8 @@
 Names that end in 8 or 4 are for lanes=8, one thread per ray; those in 1 for lanes=1, eight threads per ray.
 """
 
+from wive.warp_kernels.lanes.layout import CORNER_WORDS
+
 
 def load_16(kind: str, address: str, byte: int = 0) -> str:
     """CUDA code that declares words[4] of `kind` and loads them from an address.
@@ -59,6 +61,32 @@ DISTANCES_1 = (
 """
 )
 
+
+def set_bit_if(*comparisons: tuple[str, str, str]) -> str:
+    """Native code that returns `mask` with `bit` if any of the comparisons of arguments, or with "0", holds.
+
+    On CUDA without a branch or a selection.
+    """
+    names = sorted({name for one in comparisons for name in (one[0], one[2])} - {"0"})
+    places = {"0": "0f00000000"} | {name: f"%{2 + i}" for i, name in enumerate(names)}
+    words = {">=": "ge", "<=": "le", "==": "eq", "<": "lt"}
+    steps = []
+    for a, comparison, b in comparisons:
+        more = (".or", ", %%met") if steps else ("", "")
+        steps.append(f"setp.{words[comparison]}{more[0]}.f32 %%met, {places[a]}, {places[b]}{more[1]};")
+    arguments = ", ".join(f'"f"({name})' for name in names)
+    condition = " | ".join(f"({' '.join(one)})" for one in comparisons)
+    return f"""
+#if defined(__CUDA_ARCH__)
+    asm("{{ .reg .pred %%met; {" ".join(steps)} @%%met or.b32 %0, %0, %1; }}"
+        : "+r"(mask) : "r"(bit), {arguments});
+    return mask;
+#else
+    return mask | ({condition} ? bit : 0u);
+#endif
+"""
+
+
 # A byte of a word, which CUDA takes out in one instruction.
 BYTE_OF = """
 #if defined(__CUDA_ARCH__)
@@ -114,23 +142,42 @@ BEHIND_1 = (
 """
 )
 
-# A row of a block: the numbers of its four triangles, or that of the lane's own triangle.
-TRIANGLES_4 = """
-    const float* row = (const float*)units + at + word;
+# The address of an axis' row in a block, from the word at which the first axis' begins, by one instruction on
+# CUDA.
+BLOCK_ROW = """
+    wp::uint64 address = (wp::uint64)((const float*)units + at);
 #if defined(__CUDA_ARCH__)
-    const float4 a = __ldg((const float4*)row);
-    return wp::vec_t<4, wp::float32>(a.x, a.y, a.z, a.w);
+    asm("mad.wide.u32 %0, %1, BYTES, %0;" : "+l"(address) : "r"(axis));
 #else
-    return wp::vec_t<4, wp::float32>(row[0], row[1], row[2], row[3]);
+    address += BYTES * (wp::uint64)axis;
+#endif
+    return address;
+"""
+# The numbers of a block's four triangles, in the row of the k-th corner behind that of the first.
+TRIANGLES_4 = """
+    const float* numbers = (const float*)row + CORNER_WORDS * k;
+#if defined(__CUDA_ARCH__)
+    // k is known to the compiler, but has to be part of the instruction.
+    const float* address = (const float*)row;
+    wp::vec_t<4, wp::float32> found;
+    if (k == 0) { FIRST for (int i = 0; i < 4; ++i) found[i] = words[i]; }
+    if (k == 1) { SECOND for (int i = 0; i < 4; ++i) found[i] = words[i]; }
+    if (k == 2) { THIRD for (int i = 0; i < 4; ++i) found[i] = words[i]; }
+    return found;
+#else
+    return wp::vec_t<4, wp::float32>(numbers[0], numbers[1], numbers[2], numbers[3]);
 #endif
 """
-DOUBLE_TRIANGLES_4 = """
-    const double* row = (const double*)((const float*)units + at + word);
+for _k, _name in enumerate(("FIRST", "SECOND", "THIRD")):
+    TRIANGLES_4 = TRIANGLES_4.replace(_name, load_16("f32", "address", 4 * CORNER_WORDS * _k))
+TRIANGLES_4 = TRIANGLES_4.replace("CORNER_WORDS", str(CORNER_WORDS))
+DOUBLE_TRIANGLES_4 = f"""
+    const double* numbers = (const double*)row + {CORNER_WORDS} * k;
 #if defined(__CUDA_ARCH__)
-    const double2 a = __ldg((const double2*)row), b = __ldg((const double2*)row + 1);
+    const double2 a = __ldg((const double2*)numbers), b = __ldg((const double2*)numbers + 1);
     return wp::vec_t<4, wp::float64>(a.x, a.y, b.x, b.y);
 #else
-    return wp::vec_t<4, wp::float64>(row[0], row[1], row[2], row[3]);
+    return wp::vec_t<4, wp::float64>(numbers[0], numbers[1], numbers[2], numbers[3]);
 #endif
 """
 
@@ -212,7 +259,10 @@ STACK_8 = """
     typedef unsigned __attribute__((may_alias)) word_of_stack;
     word_of_stack* const words = (word_of_stack*)&stack;
 """
-STACK_1 = "    unsigned* const words = (unsigned*)stack;\n"
+STACK_1 = """
+    typedef unsigned __attribute__((may_alias)) word_of_stack;
+    word_of_stack* const words = (word_of_stack*)stack;
+"""
 
 
 def shared_stack_code(words: int) -> str:

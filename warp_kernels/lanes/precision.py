@@ -9,9 +9,7 @@ import warp as wp
 
 from wive.warp_kernels.lanes.lanes import (
     load_double,
-    load_double_behind,
     load_float,
-    load_float_behind,
     product,
     product_double,
     without_gradient,
@@ -26,7 +24,6 @@ PRECISIONS = {
         vec3=wp.vec3,
         words=1,
         load=load_float,
-        load_behind=load_float_behind,
         product=product,
     ),
     "float64": SimpleNamespace(
@@ -36,7 +33,6 @@ PRECISIONS = {
         vec3=wp.vec3d,
         words=2,
         load=load_double,
-        load_behind=load_double_behind,
         product=product_double,
     ),
 }

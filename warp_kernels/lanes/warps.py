@@ -106,6 +106,16 @@ WARP_LANE = """
     return thread % WIDTH;
 #endif
 """
+# A bit for each lower lane: read anew where it is needed, it takes no register elsewhere.
+LANES_BELOW = """
+#if defined(__CUDA_ARCH__)
+    unsigned lanes;
+    asm volatile("mov.u32 %0, %%lanemask_lt;" : "=r"(lanes));
+    return lanes;
+#else
+    return (1u << thread % WIDTH) - 1u;
+#endif
+"""
 WARP_WIDTH = """
 #if defined(__CUDA_ARCH__)
     return 32;
@@ -198,7 +208,8 @@ def collectives(length: int) -> SimpleNamespace:
 def warp_of(length: int) -> SimpleNamespace:
     """The threads that loop together: a warp on CUDA, the threads of one ray on the CPU device.
 
-    vote: one bit per lane whose value is not zero. index, lane: of a thread, by its number in the launch.
+    vote: one bit per lane whose value is not zero. index, lane, lanes_below: of a thread, by its number in
+    the launch.
     width: the threads of a whole warp; rays: how many rays it traces at once.
     """
     threads = 8 // expected_lanes(length)
@@ -209,6 +220,9 @@ def warp_of(length: int) -> SimpleNamespace:
     @wp.func_native(WARP_LANE.replace("WIDTH", str(threads)))
     def lane(thread: int) -> int: ...
 
+    @wp.func_native(LANES_BELOW.replace("WIDTH", str(threads)))
+    def lanes_below(thread: int) -> wp.uint32: ...
+
     @wp.func_native(WARP_WIDTH.replace("WIDTH", str(threads)))
     def width() -> int: ...
 
@@ -217,4 +231,6 @@ def warp_of(length: int) -> SimpleNamespace:
         return width() // threads
 
     vote = _vote_8 if threads == 1 else _vote_1
-    return SimpleNamespace(vote=vote, index=index, lane=lane, width=width, rays=rays, threads=threads)
+    return SimpleNamespace(
+        vote=vote, index=index, lane=lane, lanes_below=lanes_below, width=width, rays=rays, threads=threads
+    )

@@ -25,9 +25,7 @@ IDLE_LANES = 8
 class Share:
     """Where a lane is in its warp's share of the rays."""
 
-    next_ray: wp.int32  # to be given to a lane
-    number: wp.int32  # of the lane's own ray; negative if it has none
-    going: wp.int32  # whether the warp has more to do
+    next_ray: wp.int32  # to be given to a lane; negative when the warp has no more to do
 
 
 def make_loop(
@@ -38,10 +36,11 @@ def make_loop(
     turns: the rays that a warp traces in all, over those that it traces at once.
     """
     steps = make_steps(query, accuracy, length, stack_size, counters, nodes, precision)
-    keep, check, step = steps.keep, steps.check, steps.step
+    open_stack, keep, step = steps.open, steps.keep, steps.step
+    keep_number, number_kept = steps.keep_number, steps.number_kept
     settled, unscale, new_stack, sync = steps.settled, steps.unscale, steps.new_stack, steps.sync
     warp = warp_of(length)
-    vote, warp_index, warp_lane = warp.vote, warp.index, warp.lane
+    vote, warp_index, warp_lane, lanes_below = warp.vote, warp.index, warp.lane, warp.lanes_below
     warp_rays, warp_width = warp.rays, warp.width
     threads: int = warp.threads
     start = make_start(query, accuracy, precision)
@@ -62,6 +61,11 @@ def make_loop(
         """The number of rays that lanes of the warp trace."""
         return wp.int32(wp.bit_count(lanes)) // threads
 
+    @wp.func
+    def fewest_going(next_ray: int, end: int):
+        """While there are rays, those that `IDLE_LANES` leave. One thread alone fetches when it is idle."""
+        return wp.where(next_ray < end, wp.max(warp_width() - IDLE_LANES, 0), 0)
+
     @without_gradient
     @wp.func
     def load_ray(center: wp.vec3, rays: rays_type, i: int) -> frame_type:
@@ -77,9 +81,7 @@ def make_loop(
     @wp.func
     def trace_share(tree: tree_type, rays: rays_type, out: outputs_type, thread: int, turns: int):
         units = address_of(tree.units)
-        lane_of_warp = warp_lane(thread)
-        lane = lane_of_warp & (threads - 1)
-        lanes_below = (wp.uint32(1) << wp.uint32(lane_of_warp)) - wp.uint32(1)
+        lane = warp_lane(thread) & (threads - 1)
         # Numbers that change under conditions are fields of a struct: as variables they take more registers.
         share = Share()
         # In 64 bits: the last warps may have no rays, and theirs would begin beyond 2^31.
@@ -87,47 +89,45 @@ def make_loop(
         rays_per_warp = wp.int64(warp_rays() * turns)
         first = wp.int64(warp_index(thread)) * rays_per_warp
         share.next_ray = wp.int32(wp.min(first, count))
-        share.number = -1
-        share.going = 1
         end = wp.int32(wp.min(first + rays_per_warp, count))
         stack = new_stack()
+        open_stack(stack)
+        keep_number(stack, -1)  # none
+        sync()
         walk = walk_type()
         walk.child = END_OF_STACK
-        # One answer for the warp, whose threads may see the flag change at different times.
-        sound = vote(wp.uint32(tree.error[CORRUPTION])) == wp.uint32(0)
-        while share.going != 0:
+        while share.next_ray >= 0:
             at_leaves = wp.int32(wp.bit_count(vote_on(walk.child < END_OF_STACK)))
             at_nodes = wp.int32(wp.bit_count(vote_on(walk.child > END_OF_STACK)))
-            # One thread alone fetches when it is idle.
-            fewest = wp.where(share.next_ray < end, wp.max(warp_width() - IDLE_LANES, 0), 0)
-            if at_leaves + at_nodes <= fewest:
+            if at_leaves + at_nodes <= fewest_going(share.next_ray, end):
                 ends = walk.child == END_OF_STACK
                 idle = vote_on(ends)
                 last = settled(units, lane, stack, walk)
-                settle(out, share.number, lane, unscale(stack), last, ends and share.number >= 0)
+                number = number_kept(stack)
+                settle(out, number, lane, unscale(stack), last, ends and number >= 0)
                 sync()  # the old ray's numbers have been read
                 left = end - share.next_ray
-                share.going = wp.min(left, 1)
+                # One answer for the warp, whose threads may see the flag change at different times.
+                sound = vote(wp.uint32(tree.error[CORRUPTION])) == wp.uint32(0)
                 if ends:
-                    place = rays_in(idle & lanes_below)
-                    share.number = wp.where(place < left, share.next_ray + place, -1)
+                    place = rays_in(idle & lanes_below(thread))
+                    number = wp.where(place < left, share.next_ray + place, -1)
+                    keep_number(stack, number)
                     if place < left:
-                        ray = load_ray(tree.center, rays, share.number)
+                        ray = load_ray(tree.center, rays, number)
                         keep(ray, stack)
-                        walk.found = found_before(out, share.number, ray)
+                        walk.found = found_before(out, number, ray)
                         walk.tmax = box_tmax(ray.tmax)
                         walk.top = 1
                         walk.steps = 0
                         walk.inner_nodes = 0
                         walk.leaves = 0
                         walk.triangles = 0
-                        if sound and ray.valid and wanted(out, share.number):
+                        if sound and ray.valid and wanted(out, number):
                             walk.child = 0
-                share.next_ray += wp.min(rays_in(idle), left)
+                share.next_ray = wp.where(left > 0, share.next_ray + wp.min(rays_in(idle), left), -1)
                 sync()
             else:
-                leaves = at_leaves > at_nodes
-                walk = check(tree, walk, leaves)
-                walk = step(units, lane, stack, walk, leaves)
+                walk = step(tree, units, lane, stack, walk, at_leaves > at_nodes)
 
     return trace_share

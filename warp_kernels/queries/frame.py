@@ -4,6 +4,7 @@ The operations are those of cpu/traverse/frame.h, in the same order.
 """
 
 import functools
+from typing import Any
 
 import warp as wp
 
@@ -91,17 +92,6 @@ def flip_sign(x: wp.float64, sign: wp.float64):
 
 
 @wp.func
-def component(v: wp.vec3, axis: int):
-    """v[axis] by selection: an index unknown to the compiler would put v into memory."""
-    return wp.where(axis == 0, v[0], wp.where(axis == 1, v[1], v[2]))
-
-
-@wp.func
-def component(v: wp.vec3d, axis: int):
-    return wp.where(axis == 0, v[0], wp.where(axis == 1, v[1], v[2]))
-
-
-@wp.func
 def box_tmax(t: float):
     """t rounded up to float32, for boxes."""
     return t
@@ -142,10 +132,21 @@ def power_of(longest: wp.float64):
 
 
 @wp.func
+def by_sheared_axis(v: Any, longest: int):
+    """v by the axes of the triangle tests' sheared space, the direction's longest axis last.
+
+    By selection: an index unknown to the compiler would put v into memory.
+    """
+    x = wp.where(longest == 0, v[1], wp.where(longest == 1, v[2], v[0]))
+    y = wp.where(longest == 0, v[2], wp.where(longest == 1, v[0], v[1]))
+    z = wp.where(longest == 0, v[0], wp.where(longest == 1, v[1], v[2]))
+    return type(v)(x, y, z)
+
+
+@wp.func
 def axes_of(longest: int):
-    """The axes in the order of the triangle tests' sheared space, the direction's longest axis last."""
-    x = wp.where(longest == 2, 0, longest + 1)
-    return wp.vec3i(x, wp.where(x == 2, 0, x + 1), longest)
+    """The mesh axis of each sheared axis."""
+    return by_sheared_axis(wp.vec3i(0, 1, 2), longest)
 
 
 @functools.cache

@@ -5,6 +5,7 @@ from types import SimpleNamespace
 import warp as wp
 
 from wive.warp_kernels.lanes.lanes import byte_of, without_gradient
+from wive.warp_kernels.lanes.native import set_bit_if
 from wive.warp_kernels.lanes.precision import stack_numbers
 from wive.warp_kernels.queries.frame import box_tmin
 
@@ -38,12 +39,17 @@ def make_keep(lanes: SimpleNamespace, nodes: SimpleNamespace, box_base: int, fra
     return keep
 
 
-def make_visit(
-    lanes: SimpleNamespace, nodes: SimpleNamespace, stack_size: int, box_base: int, in_order: bool
-) -> wp.Function:
-    """The visit for a lane form and node form.
+@wp.func_native(set_bit_if(("near", "<=", "far")))
+def with_bit_if_met(mask: wp.uint32, bit: wp.uint32, near: float, far: float) -> wp.uint32:
+    """The mask with the bit if a ray that enters a box at `near` and leaves it at `far` meets it."""
+    ...
 
-    stack_size: children that the stack holds; if in_order, their distances are that many words behind.
+
+def make_visit(
+    lanes: SimpleNamespace, nodes: SimpleNamespace, entries: SimpleNamespace, box_base: int, in_order: bool
+) -> wp.Function:
+    """The visit for a lane form, node form and the entries of a stack.
+
     box_base: the stack word from which on `make_keep` has kept the ray. in_order: whether the nearest child
     goes on top.
     """
@@ -52,10 +58,11 @@ def make_visit(
     length = lanes.length
     vector, words = lanes.vector, lanes.words
     grid_of, distances, used = nodes.grid, nodes.distances, nodes.used
-    order_of, places, place = nodes.order, nodes.places, nodes.place
+    order_of, below, lowest = nodes.order, nodes.below, nodes.lowest
+    store_if = entries.store_if
     child_row: int = nodes.child_row
     load_row, collect = lanes.load_row, lanes.group_vote
-    stack_argument, store_word = lanes.stack_argument, lanes.store_word
+    stack_argument = lanes.stack_argument
     alone: bool = lanes.length == 8
 
     @wp.func
@@ -78,13 +85,12 @@ def make_visit(
         top: int,
     ):
         """(D) store: a hit goes above those that are farther."""
-        stored = places(order, hits, top)
+        farther = below(order, hits)
+        first = lowest(order, top)
         for i in range(length):
-            if (own & (wp.uint32(1) << wp.uint32(lane + i))) != wp.uint32(0):
-                at = place(order, stored, i, hits)
-                store_word(stack, at, children[i])
-                if wp.static(in_order):
-                    store_word(stack, stack_size + at, wp.cast(tnear[i], wp.uint32))
+            hit = own & (wp.uint32(1) << wp.uint32(lane + i))
+            behind = farther[i // 4] & wp.uint32(255 << (8 * (i % 4)))
+            store_if(stack, first, behind, hit, children[i], tnear[i])
         return wp.int32(wp.bit_count(hits))
 
     @without_gradient
@@ -119,6 +125,7 @@ def make_visit(
             r = load_vector(stack, RDIR)
             near = load_vector(stack, NEAR_BIAS)
             far = load_vector(stack, FAR_BIAS)
+            tmin = load(stack, BOX_TMIN)
             near_x, far_x = distances(
                 units, node, grid, lane, 0, byte_of(rows, 0), wp.vec2(r[0], r[0]), wp.vec2(near[0], far[0])
             )
@@ -128,12 +135,11 @@ def make_visit(
             near_z, far_z = distances(
                 units, node, grid, lane, 2, byte_of(rows, 2), wp.vec2(r[2], r[2]), wp.vec2(near[2], far[2])
             )
-            tnear = wp.max(wp.max(near_x, near_y), wp.max(near_z, vector(load(stack, BOX_TMIN))))
+            tnear = wp.max(wp.max(near_x, near_y), wp.max(near_z, vector(tmin)))
             tfar = wp.min(wp.min(far_x, far_y), wp.min(far_z, vector(tmax)))
             # (C) compress: a bit for each child hit.
             for i in range(length):
-                met = tnear[i] <= tfar[i]
-                own = own | wp.where(met, wp.uint32(1) << wp.uint32(lane + i), wp.uint32(0))
+                own = with_bit_if_met(own, wp.uint32(1) << wp.uint32(lane + i), tnear[i], tfar[i])
             own = own & used(grid)
             if wp.static(alone):
                 count = push(own, own, order, children, tnear, lane, stack, top)

@@ -24,6 +24,14 @@ class Traversal:
 
 
 @wp.struct
+class Step:
+    """What a thread does in a step."""
+
+    goes: wp.int32  # above zero if it takes part
+    count: wp.int32  # of children that it puts on the stack
+
+
+@wp.struct
 class TestedLeaf:
     """What one thread has found after a leaf, and the last block that it tested."""
 

@@ -10,15 +10,16 @@ from typing import Any
 
 import warp as wp
 
+from wive.warp_kernels.lanes.entries import entries_of
 from wive.warp_kernels.lanes.lanes import address_of, lanes_of, without_gradient
-from wive.warp_kernels.lanes.layout import ALL_BITS, END_OF_STACK, NO_PRIM, NODE_WIDTH, WORD_MASK
+from wive.warp_kernels.lanes.layout import END_OF_STACK, NO_PRIM, NODE_WIDTH, WORD_MASK
 from wive.warp_kernels.lanes.precision import PRECISIONS, stack_numbers
 from wive.warp_kernels.queries.frame import FRAMES, box_tmax
 from wive.warp_kernels.queries.query_exact import query_of
 from wive.warp_kernels.traversal.leaf import make_count, make_leaf_test, make_offer
 from wive.warp_kernels.traversal.nearest import keep_nearest_double, sortable, unsortable
 from wive.warp_kernels.traversal.slabs import BOX_WORDS, make_keep, make_visit
-from wive.warp_kernels.traversal.states import TRAVERSALS
+from wive.warp_kernels.traversal.states import TRAVERSALS, Step
 from wive.warp_kernels.tree.blocks import block_form
 from wive.warp_kernels.tree.handle import CORRUPTION, HANDLES
 from wive.warp_kernels.tree.nodes import NODES
@@ -59,12 +60,12 @@ def make_steps(
 ) -> SimpleNamespace:
     """The steps of a traversal, for a query, accuracy, lane form, stack size, node form and precision.
 
-    keep(ray, stack) comes first, and check(...) before each step(...), which all threads of a warp take
-    together, to leaves or to inner nodes; those that are at the other or at their end keep their traversal as
-    it is. settled(...) is what a thread has found at the end.
+    open(stack) comes first, and keep(ray, stack) before the steps of each ray. All threads of a warp take
+    each step(...) together, to leaves or to inner nodes; those that are at the other or at their end keep
+    their traversal as it is. settled(...) is what a thread has found at the end.
 
-    The stack, a new_stack(), holds `stack_size` children, behind them their distances if the query is in
-    order, and behind these what triangle tests, visits and queries need of the ray.
+    The stack, a new_stack(), holds `stack_size` entries, and behind them what triangle tests, visits and
+    queries need of the ray.
     """
     query_type = query_of(query, accuracy, precision)
     in_order: bool = query_type.in_order
@@ -74,12 +75,14 @@ def make_steps(
     # Both begin at even words: neighbours in a pair are stored and loaded together on CUDA.
     box_base = ray_base + ray_words + ray_words % 2
     own_base = box_base + BOX_WORDS + BOX_WORDS % 2
-    lanes = lanes_of(length, own_base + 2 * PRECISIONS[precision].words, precision)
+    number_at = own_base + 2 * PRECISIONS[precision].words
+    lanes = lanes_of(length, number_at + 1, precision)
+    entries = entries_of(lanes, in_order)
     blocks, node = block_form(lanes, nodes, precision), NODES[nodes](lanes)
     triangles = make_triangles(lanes, blocks, ray_base, precision, query_type.crossings)
     frame_type = FRAMES[precision]
     keep_box = make_keep(lanes, node, box_base, frame_type)
-    visit = make_visit(lanes, node, stack_size, box_base, in_order)
+    visit = make_visit(lanes, node, entries, box_base, in_order)
     numbers = stack_numbers(lanes, precision, own_base)
     store, load = numbers.store, numbers.load
     real = PRECISIONS[precision].real
@@ -96,20 +99,28 @@ def make_steps(
     prepare = triangles.prepare
     stack_argument, sync = lanes.stack_argument, lanes.sync
     store_word, load_word = lanes.store_word, lanes.load_word
+    child_at, distance_at = entries.child, entries.distance
     group_vote, min_reduce = lanes.group_vote, lanes.min_reduce
 
     @without_gradient
     @wp.func
     def keep(ray: frame_type, stack: stack_argument):
-        """Keep in the stack's memory what the steps need of a ray, and the bottom of the stack."""
+        """Keep in the stack's memory what the steps need of a ray."""
         prepare(ray, stack)
         keep_box(ray, stack)
         store(stack, TMIN, ray.tmin)
         store(stack, UNSCALE, ray.unscale)
-        # The bottom of the stack is always near enough to be popped, and its child ends the traversal.
-        store_word(stack, 0, ALL_BITS)
-        if wp.static(in_order):
-            store_word(stack, stack_size, wp.cast(-wp.inf, wp.uint32))
+
+    @without_gradient
+    @wp.func
+    def keep_number(stack: stack_argument, number: int):
+        """Keep the number of the thread's ray: it is needed when the ray has ended."""
+        store_word(stack, number_at, wp.uint32(number))
+
+    @without_gradient
+    @wp.func
+    def number_kept(stack: stack_argument):
+        return wp.int32(load_word(stack, number_at))
 
     @without_gradient
     @wp.func
@@ -123,68 +134,71 @@ def make_steps(
 
     @wp.func
     def goes_on(child: int, to_leaf: bool):
-        """Whether a traversal at this child takes a step to leaves, or to inner nodes."""
-        leaf_or_node = wp.where(to_leaf, END_OF_STACK - child, child - END_OF_STACK)
-        return leaf_or_node > 0
+        """Above zero if a traversal at this child takes a step to leaves, or to inner nodes."""
+        return wp.where(to_leaf, END_OF_STACK - child, child - END_OF_STACK)
+
+    # Structs are changed field by field: one that is assigned as a whole under a condition takes its
+    # registers twice on CUDA. Numbers that change under conditions are fields: as variables they would be
+    # selected anew behind each of them.
 
     @without_gradient
     @wp.func
-    def check(tree: tree_type, walk: walk_type, to_leaf: bool) -> walk_type:
-        """End the traversal, with an error, if it goes on but can't take its next step."""
-        if goes_on(walk.child, to_leaf):
+    def step(
+        tree: tree_type, units: wp.uint64, lane: int, stack: stack_argument, walk: walk_type, to_leaf: bool
+    ) -> walk_type:
+        """Test the triangles of a leaf or visit an inner node, and take the next child from the stack.
+
+        A traversal that can't take the step ends, with an error.
+        """
+        begin = walk.child & WORD_MASK
+        own = Step()
+        own.goes = goes_on(walk.child, to_leaf)
+        if own.goes > 0:
             walk.steps += 1
             if (
                 walk.steps > tree.step_limit
                 or walk.top > wp.static(stack_size - NODE_WIDTH)
-                or (walk.child & WORD_MASK) >= tree.units.shape[0]
+                or begin >= tree.units.shape[0]
             ):
                 tree.error[CORRUPTION] = 1
                 walk.child = END_OF_STACK
-        return walk
-
-    # Structs are changed field by field: one that is assigned as a whole under a condition takes its
-    # registers twice on CUDA.
-
-    @without_gradient
-    @wp.func
-    def step(units: wp.uint64, lane: int, stack: stack_argument, walk: walk_type, to_leaf: bool) -> walk_type:
-        """Test the triangles of a leaf or visit an inner node, and take the next child from the stack."""
-        begin = walk.child & WORD_MASK
-        goes = goes_on(walk.child, to_leaf)
+                own.goes = 0
         if to_leaf:
             block_count = (walk.child & 7) + 1
             last = wp.uint32(0)
-            if goes:
+            if own.goes > 0:
                 leaf = test_leaf(units, begin, block_count, lane, stack, load(stack, TMIN), walk.found)
                 walk.found = leaf.found
                 last = wp.uint32(leaf.last)
-                walk.top -= 1
             if wp.static(counters):
                 last = min_reduce(last)
-                if goes:
+                if own.goes > 0:
                     walk.leaves += 1
                     walk.triangles += count_triangles(units, begin, wp.min(block_count, int(last) + 1))
             if wp.static(in_order):
-                # Threads that do not go are among others that do not, whose least it is already.
-                walk.tmax = unsortable(min_reduce(sortable(box_tmax(walk.found.t))))
+                if wp.static(length == 8):
+                    walk.tmax = box_tmax(walk.found.t)
+                else:
+                    # Threads that do not go are among others that do not, whose least it is already.
+                    walk.tmax = unsortable(min_reduce(sortable(box_tmax(walk.found.t))))
             if wp.static(first_hit_ends):
                 hit = group_vote(wp.where(walk.found.prim != NO_PRIM, wp.uint32(1), wp.uint32(0)))
-                if goes and hit != wp.uint32(0):
-                    walk.top = 0  # where the child is that ends the traversal
+                if own.goes > 0 and hit != wp.uint32(0):
+                    walk.top = 1  # the child below ends the traversal
         else:
-            count = visit(units, begin, lane, walk.tmax, stack, walk.top, goes)
+            own.count = visit(units, begin, lane, walk.tmax, stack, walk.top, own.goes > 0)
             sync()
-            if goes:
-                walk.top += count - 1
-                if wp.static(counters):
+            if wp.static(counters):
+                if own.goes > 0:
                     walk.inner_nodes += 1
-        if goes:
-            walk.child = wp.cast(load_word(stack, walk.top), wp.int32)
+        if own.goes > 0:
+            walk.top += own.count - 1
             if wp.static(in_order):
-                # Those that are behind the best hit are passed over.
-                while wp.cast(load_word(stack, stack_size + walk.top), wp.float32) > walk.tmax:
-                    walk.top -= 1
-                    walk.child = wp.cast(load_word(stack, walk.top), wp.int32)
+                if own.count == 0:
+                    # Those that are behind the best hit are passed over; one just put there never is.
+                    while distance_at(stack, walk.top) > walk.tmax:
+                        walk.top -= 1
+            walk.child = child_at(stack, walk.top)
         sync()
         return walk
 
@@ -206,8 +220,10 @@ def make_steps(
 
     return SimpleNamespace(
         keep=keep,
+        open=entries.open,
+        keep_number=keep_number,
+        number_kept=number_kept,
         begin=begin,
-        check=check,
         step=step,
         settled=settled,
         unscale=unscale,
@@ -225,7 +241,7 @@ def make_traversal(
     traverse(tree, ray, found) continues from the state `found` and returns one of TRAVERSALS.
     """
     steps = make_steps(query, accuracy, 8, stack_size, False, nodes, precision)
-    keep, begin, check, new_stack = steps.keep, steps.begin, steps.check, steps.new_stack
+    open_stack, keep, begin, new_stack = steps.open, steps.keep, steps.begin, steps.new_stack
     step = steps.step
     tree_type, found_type = HANDLES[accuracy, precision], query_of(query, accuracy, precision).state
     frame_type, walk_type = FRAMES[precision], TRAVERSALS[found_type]
@@ -235,12 +251,11 @@ def make_traversal(
     def traverse(tree: tree_type, ray: frame_type, found: found_type) -> walk_type:
         units = address_of(tree.units)
         stack = new_stack()
+        open_stack(stack)
         keep(ray, stack)
         walk = begin(ray, found)
         while walk.child != END_OF_STACK:
-            to_leaf = walk.child < 0
-            walk = check(tree, walk, to_leaf)
-            walk = step(units, 0, stack, walk, to_leaf)
+            walk = step(tree, units, 0, stack, walk, walk.child < 0)
         return walk
 
     return traverse

@@ -27,6 +27,7 @@ from wive.warp_kernels.lanes.layout import (
     VERTEX_WORDS,
     VERTICES_SHIFT,
 )
+from wive.warp_kernels.lanes.native import BLOCK_ROW
 from wive.warp_kernels.lanes.precision import PRECISIONS
 
 
@@ -34,11 +35,15 @@ def plain_block(lanes: SimpleNamespace, precision: str) -> SimpleNamespace:
     """Four triangles side by side; NaN fails every test in the unused lanes."""
     load_triangles = lanes.load_triangles
     numbers = PRECISIONS[precision]
-    real, vec3, load_number, vector = numbers.real, numbers.vec3, numbers.load_behind, lanes.triangles
+    real, vec3, load_number, vector = numbers.real, numbers.vec3, numbers.load, lanes.triangles
     words: int = numbers.words
+    own: bool = lanes.triangles_length == 1
     block_words: int = BLOCK_WORDS * words
     row_words: int = BLOCK_WIDTH * words
     vertex_words: int = 3 * row_words
+
+    @wp.func_native(BLOCK_ROW.replace("BYTES", str(4 * row_words)))
+    def row_at(units: wp.uint64, at: int, axis: int) -> wp.uint64: ...
 
     @wp.func
     def block_at(units: wp.uint64, begin: int, i: int):
@@ -58,18 +63,19 @@ def plain_block(lanes: SimpleNamespace, precision: str) -> SimpleNamespace:
 
     @wp.func
     def corners(units: wp.uint64, block: int, lane: int, k: int, axes: wp.vec3i):
-        x = load_triangles(units, block + row_words * axes[0], vertex_words * k, lane)
-        y = load_triangles(units, block + row_words * axes[1], vertex_words * k, lane)
-        z = load_triangles(units, block + row_words * axes[2], vertex_words * k, lane)
+        at = block + words * wp.where(own, lane & 3, 0)
+        x = load_triangles(row_at(units, at, axes[0]), k)
+        y = load_triangles(row_at(units, at, axes[1]), k)
+        z = load_triangles(row_at(units, at, axes[2]), k)
         return x, y, z
 
     @wp.func
     def corner(units: wp.uint64, block: int, k: int, j: int, axes: wp.vec3i):
         at = block + words * j
         return vec3(
-            load_number(units, at + row_words * axes[0], vertex_words * k),
-            load_number(units, at + row_words * axes[1], vertex_words * k),
-            load_number(units, at + row_words * axes[2], vertex_words * k),
+            load_number(row_at(units, at, axes[0]), vertex_words * k),
+            load_number(row_at(units, at, axes[1]), vertex_words * k),
+            load_number(row_at(units, at, axes[2]), vertex_words * k),
         )
 
     @wp.func

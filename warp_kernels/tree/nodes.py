@@ -4,7 +4,7 @@ rows_of(octant) says where in a node the rows begin that rays of an octant need:
 planes, and one for the order. grid(...) is what planes are relative to, and distances(...) are those to the
 near and to the far planes of an axis, along the ray from its origin: plane * rdir + bias.
 
-order(...) is what a visit needs of the children's order; places(...) and place(...) are where on the stack a
+order(...) is what a visit needs of the children's order; below(...) and lowest(...) say where on the stack a
 slot's child goes among the hits. used(grid) has a bit for each slot that has a child.
 """
 
@@ -135,6 +135,7 @@ def _places(
     eight: bool = lanes.length == 8
     low_rows = [first_plane + 2 * row_bytes * axis for axis in range(3)]
     lowest_rows = int.from_bytes(bytes([*low_rows, order_byte]), "little", signed=True)
+    to_sign = 32 - (row_bytes << 16).bit_length()
 
     @wp.func
     def low_row(axis: int):
@@ -155,25 +156,24 @@ def _places(
     def order(units: wp.uint64, node: int, lane: int, rows: wp.uint32):
         """The slots behind each slot in octants 0 to 3, and whether the ray's octant is one backwards."""
         behind = load_behind(units, node, byte_of(rows, ORDER_BYTE), lane)
-        backwards = rows & wp.uint32(row_bytes << 16)  # from the high z planes to the low ones
-        return wp.vec3ui(behind[0], behind[1], backwards)
+        # Backwards from the high z planes to the low ones: their bit, in all places.
+        backwards = wp.cast(rows << wp.uint32(to_sign), wp.int32) >> 31
+        return wp.vec3ui(behind[0], behind[1], wp.uint32(backwards))
 
     @wp.func
-    def places(order: wp.vec3ui, hits: wp.uint32, top: int):
-        """The place of the hit that none is behind, and the step from a place to that of a hit before it."""
-        if order[2] != wp.uint32(0):
-            return wp.vec2i(top + wp.int32(wp.bit_count(hits)) - 1, -1)
-        return wp.vec2i(top, 1)
+    def below(order: wp.vec3ui, hits: wp.uint32):
+        """A byte for each slot: the hits that go below its own on the stack, and its own if backwards."""
+        in_bytes = hits * wp.uint32(0x01010101)
+        return wp.vec2ui((order[0] ^ order[2]) & in_bytes, (order[1] ^ order[2]) & in_bytes)
 
     @wp.func
-    def place(order: wp.vec3ui, places: wp.vec2i, i: int, hits: wp.uint32):
-        """Above the hits that are farther."""
-        behind = (order[i // 4] >> wp.uint32(8 * (i % 4))) & hits
-        return places[0] + places[1] * wp.int32(wp.bit_count(behind))
+    def lowest(order: wp.vec3ui, top: int):
+        """Where on the stack a hit goes that has none in its byte of `below`."""
+        return top + wp.cast(order[2], wp.int32)
 
     return {
         "low_row": low_row, "rows_of": rows_of,
-        "order": order, "places": places, "place": place,
+        "order": order, "below": below, "lowest": lowest,
     }  # fmt: skip
 
 

@@ -12,7 +12,7 @@ from wive.warp_kernels.lanes.exact_native import (
 from wive.warp_kernels.lanes.lanes import product, without_gradient
 from wive.warp_kernels.lanes.layout import NO_PRIM, NODE_WIDTH
 from wive.warp_kernels.lanes.precision import stack_numbers
-from wive.warp_kernels.queries.frame import MAX_FLOAT, SUBNORMAL_STEP, RayFrame, axes_of, component
+from wive.warp_kernels.queries.frame import MAX_FLOAT, SUBNORMAL_STEP, RayFrame, axes_of, by_sheared_axis
 from wive.warp_kernels.queries.query import Query
 from wive.warp_kernels.queries.query_exact import ExactBest
 
@@ -67,7 +67,7 @@ def exact_triangles(
     @wp.func
     def prepare(ray: RayFrame, stack: stack_argument):
         """Keep what the test needs of a ray."""
-        axes = axes_of(ray.longest_axis)
+        direction = by_sheared_axis(ray.given_direction, ray.longest_axis)
         store_word(stack, ray_base + LONGEST_AXIS, wp.uint32(ray.longest_axis))
         for i in range(3):
             store(stack, ORIGIN + i, ray.origin[i])
@@ -75,9 +75,9 @@ def exact_triangles(
         store(stack, TMIN, ray.given_tmin)
         store(stack, TMAX, ray.given_tmax)
         store(stack, UNSCALE, ray.unscale)
-        inverse = wp.float64(1.0) / wp.float64(component(ray.given_direction, axes[2]))
+        inverse = wp.float64(1.0) / wp.float64(direction[2])
         for i in range(2):
-            shear = wp.float64(component(ray.given_direction, axes[i])) * inverse
+            shear = wp.float64(direction[i]) * inverse
             store_double(stack, SHEAR + i, shear_of(shear))
         store_double(stack, INVERSE, inverse)
 

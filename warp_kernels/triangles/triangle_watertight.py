@@ -8,8 +8,9 @@ from types import SimpleNamespace
 import warp as wp
 
 from wive.warp_kernels.lanes.lanes import lowest_lane, product, product_double, without_gradient
+from wive.warp_kernels.lanes.native import set_bit_if
 from wive.warp_kernels.lanes.precision import stack_numbers
-from wive.warp_kernels.queries.frame import RayFrame, axes_of, component
+from wive.warp_kernels.queries.frame import RayFrame, axes_of, by_sheared_axis
 from wive.warp_kernels.triangles.sheared import edges_in_lanes, side_passed, sides_beside
 
 # What the test keeps of a ray, in words: the mesh axis of each sheared axis, then floats by sheared axis:
@@ -42,6 +43,24 @@ def edges_of(a: wp.vec3d, b: wp.vec3d, c: wp.vec3d):
     return wp.vec3d(
         edge_of(b[0], b[1], c[0], c[1]), edge_of(c[0], c[1], a[0], a[1]), edge_of(a[0], a[1], b[0], b[1])
     )
+
+
+@wp.func_native(set_bit_if(("low", ">=", "0"), ("high", "<=", "0")))
+def with_bit_if_inside(mask: wp.uint32, bit: wp.uint32, low: float, high: float) -> wp.uint32:
+    """The mask with the bit if the least and the largest edge function do not differ in sign."""
+    ...
+
+
+@wp.func_native(set_bit_if(("low", "==", "0"), ("high", "==", "0")))
+def with_bit_if_tied(mask: wp.uint32, bit: wp.uint32, low: float, high: float) -> wp.uint32:
+    """The mask with the bit if the least or the largest edge function is zero."""
+    ...
+
+
+@wp.func_native(set_bit_if(("low", "<", "0")))
+def with_bit_if_negative(mask: wp.uint32, bit: wp.uint32, low: float) -> wp.uint32:
+    """The mask with the bit if the least edge function is negative."""
+    ...
 
 
 def watertight_triangles(
@@ -83,13 +102,14 @@ def watertight_triangles(
     def prepare(ray: RayFrame, stack: stack_argument):
         """Keep what the test needs of a ray."""
         axes = axes_of(ray.longest_axis)
-        forward = component(ray.direction, axes[2])
+        origin = by_sheared_axis(ray.origin, ray.longest_axis)
+        direction = by_sheared_axis(ray.direction, ray.longest_axis)
         for i in range(3):
             store_word(stack, ray_base + AXES + i, wp.uint32(axes[i]))
-            store(stack, ORIGIN + i, component(ray.origin, axes[i]))
-            store(stack, DIRECTION + i, component(ray.direction, axes[i]))
+            store(stack, ORIGIN + i, origin[i])
+            store(stack, DIRECTION + i, direction[i])
         for i in range(2):
-            store(stack, SHEAR + i, component(ray.direction, axes[i]) / forward)
+            store(stack, SHEAR + i, direction[i] / direction[2])
 
     @without_gradient
     @wp.func
@@ -117,7 +137,7 @@ def watertight_triangles(
     @without_gradient
     @wp.func
     def across(v: wp.vec3, stack: stack_argument, axis: int):
-        """A corner in the plane across the ray, scaled by the direction's longest component."""
+        """A corner in the plane across the ray, scaled by the direction's longest by_sheared_axis."""
         forward = wp.float64(direction_of(stack, 2))
         slope = wp.float64(direction_of(stack, axis))
         return product_double(away(v, stack, axis), forward) - product_double(slope, away(v, stack, 2))
@@ -186,21 +206,14 @@ def watertight_triangles(
         high = wp.max(wp.max(u, v), w)
         hit_mask = wp.uint32(0)
         for i in range(length):
-            if low[i] >= 0.0 or high[i] <= 0.0:
-                hit_mask = hit_mask | wp.uint32(1 << i)
+            hit_mask = with_bit_if_inside(hit_mask, wp.uint32(1 << i), low[i], high[i])
         hit_mask = used(units, block, lane, hit_mask)
         negative = wp.uint32(0)
         if hit_mask != wp.uint32(0):
-            any_tie = bool(False)
-            for i in range(length):
-                if low[i] < 0.0:
-                    negative = negative | wp.uint32(1 << i)
-                any_tie = any_tie or low[i] == 0.0 or high[i] == 0.0
             ties = wp.uint32(0)
-            if any_tie:
-                for i in range(length):
-                    if low[i] == 0.0 or high[i] == 0.0:
-                        ties = ties | wp.uint32(1 << i)
+            for i in range(length):
+                negative = with_bit_if_negative(negative, wp.uint32(1 << i), low[i])
+                ties = with_bit_if_tied(ties, wp.uint32(1 << i), low[i], high[i])
             # An edge function of zero may hide a sign; it is computed again in double, which holds products.
             ties = ties & hit_mask
             while ties != wp.uint32(0):

@@ -11,7 +11,7 @@ import warp as wp
 from wive.warp_kernels.lanes.lanes import product_double, without_gradient
 from wive.warp_kernels.lanes.native import EXACT_WEIGHT
 from wive.warp_kernels.lanes.precision import stack_numbers
-from wive.warp_kernels.queries.frame import RayFrame64, axes_of, component
+from wive.warp_kernels.queries.frame import RayFrame64, axes_of, by_sheared_axis
 from wive.warp_kernels.triangles.sheared import edges_in_lanes, side_passed, sides_beside
 
 # What the test keeps of a ray: the mesh axis of each sheared axis, three words, then doubles, of which these
@@ -48,7 +48,7 @@ def exact_weight_of(a: wp.vec3d, b: wp.vec3d):
 
 @wp.func
 def largest(a: wp.vec3d, b: wp.vec3d, c: wp.vec3d, axis: int):
-    """The largest component of a triangle's corners on an axis."""
+    """The largest by_sheared_axis of a triangle's corners on an axis."""
     return wp.max(wp.max(wp.abs(a[axis]), wp.abs(b[axis])), wp.abs(c[axis]))
 
 
@@ -84,14 +84,15 @@ def watertight_doubles(
     def prepare(ray: RayFrame64, stack: stack_argument):
         """Keep what the test needs of a ray."""
         axes = axes_of(ray.longest_axis)
-        forward = component(ray.direction, axes[2])
+        origin = by_sheared_axis(ray.origin, ray.longest_axis)
+        direction = by_sheared_axis(ray.direction, ray.longest_axis)
         for i in range(3):
             store_word(stack, ray_base + i, wp.uint32(axes[i]))
-            store(stack, ORIGIN + i, component(ray.origin, axes[i]))
+            store(stack, ORIGIN + i, origin[i])
         for i in range(2):
-            shear = component(ray.direction, axes[i]) / forward
+            shear = direction[i] / direction[2]
             store(stack, SHEAR + i, wp.where(wp.abs(shear) < SMALLEST_SHEAR, wp.float64(0.0), shear))
-        store(stack, FORWARD, forward)
+        store(stack, FORWARD, direction[2])
 
     @without_gradient
     @wp.func
