@@ -205,6 +205,11 @@ class _Body:
     def _value(self, text: str, kind: str) -> str:
         """A register, a number or the address of a variable, as a value of that type."""
         as_type = TYPES[kind]
+        if text.startswith("{"):  # several registers side by side, the lowest first
+            parts = split_operands(text[1:-1])
+            width = 8 * SIZES[kind] // len(parts)
+            values = (self._value(part, f"u{width}") for part in parts)
+            return " | ".join(f"{as_type}({value}) << {width * i}" for i, value in enumerate(values))
         if text in SPECIAL:
             return f"{as_type}({SPECIAL[text]})"
         if text.startswith("%"):

@@ -70,7 +70,7 @@ def set_bit_if(*comparisons: tuple[str, str, str]) -> str:
     names = sorted({name for one in comparisons for name in (one[0], one[2])} - {"0"})
     places = {"0": "0f00000000"} | {name: f"%{2 + i}" for i, name in enumerate(names)}
     words = {">=": "ge", "<=": "le", "==": "eq", "<": "lt"}
-    steps = []
+    steps: list[str] = []
     for a, comparison, b in comparisons:
         more = (".or", ", %%met") if steps else ("", "")
         steps.append(f"setp.{words[comparison]}{more[0]}.f32 %%met, {places[a]}, {places[b]}{more[1]};")
