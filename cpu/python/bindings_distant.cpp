@@ -91,17 +91,20 @@ py::object bring_near(const Array<double>& origins, const Array<double>& directi
     double* steps_out = steps.mutable_data();
     const Distance distance = {Double3::load(center.data()), far, most};
     std::atomic<bool> any = false;
+    constexpr float infinity = std::numeric_limits<float>::infinity();
+    constexpr double most_t = std::numeric_limits<float>::max();
     const auto bring = [&](std::size_t i) {
         const Double3 origin = Double3::load(origins.data() + 3 * i);
         const Double3 direction = Double3::load(directions.data() + 3 * i);
-        const double step = kept && rays.are_floats(i) ? 0 : distance.step(origin, direction);
         const float least = tmin.data()[tmin.size() == 1 ? 0 : i], greatest = tmax.data()[tmax.size() == 1 ? 0 : i];
+        double step = kept && rays.are_floats(i) ? 0 : distance.step(origin, direction);
+        // Hits near the scene have a t of about the step: where float can't hold that, the ray stays.
+        if (std::abs(step) > most_t / 2) step = 0;
         double start[3];
         distance.start(origin, direction, step).store(start);
         for (std::size_t axis = 0; axis < 3; ++axis)
             near_out[3 * i + axis] = step == 0 ? rounded_origins.data()[3 * i + axis] : static_cast<float>(start[axis]);
         // A ray that misses by its limits keeps them.
-        constexpr float infinity = std::numeric_limits<float>::infinity();
         const bool moved = step != 0, shifted = moved && least <= greatest;
         low_out[i] = shifted ? float_below(middle(least, -infinity) - step) : least;
         high_out[i] = shifted ? float_above(middle(greatest, infinity) - step) : greatest;

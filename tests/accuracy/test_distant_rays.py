@@ -103,6 +103,18 @@ def test_limits_are_those_of_t_from_afar(backend, aimed):
         assert not scene.occluded(rays[0], -rays[1]).any()
 
 
+@pytest.mark.parametrize("limit", [1.0, 3e38, np.inf])
+def test_a_hit_whose_t_float32_can_t_hold_is_none_within_limits(backend, limit, aimed):
+    scene = wive.Scene(*sphere(4), backend=backend)
+    targets, directions = aimed
+    for length in (1e-31, 1e-34, 1e-40):
+        rays = targets - 1e9 * directions, length * directions
+        hits = scene.intersect(*rays, tmax=limit)
+        assert (hits.t[hits.mask] == np.inf).all() and (limit == np.inf or not hits.mask.any())
+        behind = scene.intersect(rays[0], -rays[1], tmin=-limit, tmax=0)
+        assert (behind.t[behind.mask] == -np.inf).all() and (limit == np.inf or not behind.mask.any())
+
+
 def test_each_ray_is_moved_by_itself(backend, aimed):
     scene = wive.Scene(*sphere(3), backend=backend)
     targets, directions = aimed
