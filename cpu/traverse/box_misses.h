@@ -73,8 +73,8 @@ private:
     // division. A ray also misses if it starts outside of the box on an axis and leads away from it on that axis.
     // Relative to the tree's centre, with O the origin's and P the planes' largest coordinate, rounding and the
     // triangle test (frame.h) add up to less than 20u (O + P); the box is enlarged by 32u (O + P). Components of the
-    // direction count as at least 2^-30 of the longest, so that underflow is less than that slack if (O + P) times the
-    // longest is in range.
+    // direction count as at least 2^-30 of the longest, so that underflow is less than that slack if O + P and its
+    // product with the longest are in range.
     unsigned misses_of_four(std::size_t first) const {
         constexpr float slack_factor = 0x1p-19f, smallest_part = 0x1p-30f, least = 0x1p-90f, most = 0x1p120f;
         const auto load = [](const Real* from, std::size_t stride) {
@@ -106,7 +106,8 @@ private:
                 ahead & less(reach[axis], abs(origin[axis])) & ~(sign_bits(origin[axis]) ^ sign_bits(direction[axis]));
         }
         const Float4 magnitude = distance * longest;
-        return misses & less_equal(Float4::all(least), magnitude) & less_equal(magnitude, Float4::all(most)) & 15u;
+        misses &= less_equal(Float4::all(least), min(distance, magnitude));
+        return misses & less_equal(magnitude, Float4::all(most)) & 15u;
     }
 
     const BvhView bvh_;

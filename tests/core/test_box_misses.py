@@ -58,3 +58,18 @@ def test_no_ray_that_hits_is_dropped(kernel: str, dtype: type, scale: float, nod
         assert np.array_equal(occluded, alone[1] >= 0)
         hit += int((alone[1] >= 0).sum())
     assert hit > 3000
+
+
+@pytest.mark.parametrize("kernel", KERNELS)
+@pytest.mark.parametrize("nodes", ["float32", "compressed"])
+def test_no_ray_at_a_mesh_of_subnormal_size_is_dropped(kernel: str, nodes: str) -> None:
+    if kernel == "avx512.half":
+        pytest.skip("the half form has float32 nodes and numbers only")
+    vertices = np.array([[7.0, -5, 1], [7, 6.5, -9.5], [7, 11, -0.5]]) * 1e-45
+    bvh = _cpu.Bvh(vertices, np.array([[0, 1, 2]], np.int32), nodes=nodes)
+    origins = np.tile(vertices.mean(axis=0), (64, 1))
+    directions = np.random.default_rng(3).standard_normal((64, 3)) * [1e7, 1e-38, 1e18]
+    limits = np.array([-np.inf]), np.array([np.inf])
+    alone, in_flight = (bvh.intersect(kernel, origins, directions, *limits, in_flight=n)[1] for n in (1, 24))
+    assert np.array_equal(alone, in_flight)
+    assert (alone >= 0).sum() > 32
