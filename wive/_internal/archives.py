@@ -103,12 +103,12 @@ class _Stored(io.RawIOBase):
         return count
 
     def seek(self, place: int, whence: int = os.SEEK_SET) -> int:
-        """Go forward."""
-        left = place - (self._at if whence == os.SEEK_SET else 0)
+        """Go forward; UnsupportedOperation for going back."""
+        begins = {os.SEEK_SET: 0, os.SEEK_CUR: self._at, os.SEEK_END: self._info.file_size}
+        left = begins[whence] + place - self._at
+        if left < 0:
+            raise io.UnsupportedOperation("a member of an archive is read from front to back")
         skipped = bytearray(min(left, SKIPPED))
-        while left > 0:
-            count = self.readinto(memoryview(skipped)[:left])
-            if not count:
-                break
+        while left > 0 and (count := self.readinto(memoryview(skipped)[:left])):
             left -= count
         return self._at
