@@ -216,7 +216,8 @@ class Hits(OnSurface, OfMesh):
         float32, or float64 for a float64 scene. Each origin lies on the side of its triangle that its
         direction points to, just far enough that a ray from there with tmin = 0 doesn't hit this triangle in
         a scene of the same accuracy and precision; docs/accuracy.md, "Spawned rays", has the proof, and what
-        holds for neighbours. All directions to one side have the same origin. Rays from NaN origins miss.
+        holds for neighbours. In `fast`, meshes must measure between 1e-12 and 1e12. All directions to one
+        side have the same origin. Rays from NaN origins miss.
 
         Arguments:
             directions: (n,3) real numbers, used in the scene's precision, or (3,) for all; of any length. On
