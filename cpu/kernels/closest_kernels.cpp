@@ -1,5 +1,6 @@
 #include "kernels/closest_kernels.h"
 
+#include "kernels/of_isa.h"
 #include "kernels/share_runs.h"
 
 namespace wive {
@@ -12,12 +13,7 @@ constexpr std::size_t points_per_run = 256;
 
 template <class Real>
 const ClosestKernels<Real>* find_closest_kernels(IsaName isa) {
-    if (isa == IsaName::scalar) return closest_kernels<IsaName::scalar, Real>();
-#if defined(WIVE_X86_64)
-    return isa == IsaName::avx2 ? closest_kernels<IsaName::avx2, Real>() : closest_kernels<IsaName::avx512, Real>();
-#else
-    return nullptr;
-#endif
+    return of_isa(isa, [](auto known) { return closest_kernels<known(), Real>(); });
 }
 
 template const ClosestKernels<float>* find_closest_kernels(IsaName);

@@ -1,5 +1,6 @@
 #include "kernels/dispatch.h"
 
+#include <algorithm>
 #include <stdexcept>
 
 #include "core/processor.h"
@@ -73,6 +74,9 @@ template const KernelTable<double>& find_kernels(std::string_view);
 
 IsaName find_isa(std::string_view name) { return find_entry(name).isa; }
 
-IsaName best_isa() { return has_avx512() ? IsaName::avx512 : has_avx2() ? IsaName::avx2 : IsaName::scalar; }
+IsaName best_isa() {
+    // From the best to the one that runs everywhere.
+    return std::ranges::find_if(entries(), [](const Entry& entry) { return entry.compiled && entry.runs; })->isa;
+}
 
 }  // namespace wive

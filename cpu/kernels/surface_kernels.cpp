@@ -1,15 +1,12 @@
 #include "kernels/surface_kernels.h"
 
+#include "kernels/of_isa.h"
+
 namespace wive {
 
 template <class Real>
 const SurfaceKernels<Real>* find_surface_kernels(IsaName isa) {
-    if (isa == IsaName::scalar) return surface_kernels<IsaName::scalar, Real>();
-#if defined(WIVE_X86_64)
-    return isa == IsaName::avx2 ? surface_kernels<IsaName::avx2, Real>() : surface_kernels<IsaName::avx512, Real>();
-#else
-    return nullptr;
-#endif
+    return of_isa(isa, [](auto known) { return surface_kernels<known(), Real>(); });
 }
 
 template const SurfaceKernels<float>* find_surface_kernels(IsaName);

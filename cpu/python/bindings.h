@@ -260,10 +260,10 @@ void for_each_precision(const Define& define) {
 
 using PyBvhClass = py::class_<PyBvh>;
 
-// Defined in bindings_queries.cpp: ray queries. In bindings_surface.cpp: points and normals of hits. In
-// bindings_closest.cpp: closest points. In bindings_spawn.cpp: spawned rays. In bindings_segments.cpp: line of sight.
-// In bindings_distant.cpp: rays from far away. In bindings_stored.cpp: stored trees. In bindings_streams.cpp:
-// rays and checksums of streams. In bindings_parts.cpp: single meshes that move.
+// Defined in bindings_queries.cpp: ray queries. In bindings_surface.cpp: points, normals and error bounds of hits, and
+// spawned rays. In bindings_closest.cpp: closest points. In bindings_segments.cpp: line of sight. In
+// bindings_distant.cpp: rays from far away. In bindings_stored.cpp: stored trees. In bindings_streams.cpp: rays and
+// checksums of streams. In bindings_parts.cpp: single meshes that move.
 void bind_queries(PyBvhClass& bvh);
 void bind_closest(py::module_& m, PyBvhClass& bvh);
 void bind_surface(py::module_& m);
