@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any, TypedDict
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike, DTypeLike, NDArray
 from wive._internal import arguments
 from wive._internal.inside import closedness, contains, passes_of
 from wive._internal.mesh_rays import MeshRays, mesh_class, rays_of, set_rays
-from wive._internal.options import AccuracyOption, NodesOption, QualityOption, refuse_lacking
+from wive._internal.options import AccuracyOption, NodesOption, QualityOption, TreeOptions, refuse_lacking
 from wive._internal.options import threads as checked_threads
 from wive._internal.placed_mesh import Float64, Found, Int64, PlacedMesh
 from wive._internal.precision import FLOAT64, Floats, real_asked
@@ -219,16 +219,10 @@ class RayMeshIntersector:
         return self.__copy__()
 
 
-class IntersectorOptions(TypedDict, total=False):
+class IntersectorOptions(TreeOptions, total=False):
     """The options of `RayMeshIntersector`; see there."""
 
     scale_to_box: bool
-    backend: str
-    device: str | None
-    accuracy: AccuracyOption
-    nodes: NodesOption
-    quality: QualityOption
-    threads: int | None
     dtype: DTypeLike
 
 

@@ -7,10 +7,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from wive._internal.options import AccuracyOption, NodesOption
 from wive._internal.precision import Floats
 
-Accuracy = Literal["fast", "watertight", "exact"]
-Nodes = Literal["float32", "compressed"]
 Part = Literal["scale", "distance", "plane", "doubt", "leaving"]
 RADIUS = 0.1  # of the ball, in metres
 USUAL_GROUND = 2.0  # metres across
@@ -32,10 +31,10 @@ class Rays:
     faces: Faces
     origins: Floats
     directions: Floats
-    accuracy: Accuracy = "watertight"
-    nodes: Nodes = "float32"
+    accuracy: AccuracyOption = "watertight"
+    nodes: NodesOption = "float32"
 
-    def typed(self, dtype: type[np.floating], accuracy: Accuracy) -> "Rays":
+    def typed(self, dtype: type[np.floating], accuracy: AccuracyOption) -> "Rays":
         """The same in this dtype and accuracy."""
         arrays = (array.astype(dtype) for array in (self.vertices, self.origins, self.directions))
         vertices, origins, directions = arrays
@@ -54,7 +53,7 @@ class Cliff:
 
 
 # What float32 and float64 scenes answer by, and what takes float32 rays as they are.
-KINDS: tuple[tuple[type[np.floating], Accuracy], ...] = (
+KINDS: tuple[tuple[type[np.floating], AccuracyOption], ...] = (
     (np.float32, "watertight"),
     (np.float64, "watertight"),
     (np.float32, "exact"),
@@ -132,17 +131,17 @@ def _doubt(count: int, levels: int) -> Iterator[Cliff]:
 def _leaving(count: int, levels: int) -> Cliff:
     """Rays from the outer side of a room around the ball, outwards, in both node forms."""
     random = np.random.default_rng(4)
+    import trimesh
+
     vertices, faces = _ball(levels)
-    room = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
-    sides = np.array([[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1],
-                      [2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4], [1, 5, 7], [1, 7, 3]])  # fmt: skip
+    room = trimesh.creation.box((2, 2, 2))
     origins = random.uniform(-1, 1, (count, 3))
     axes, ends = random.integers(3, size=count), random.choice([-1.0, 1.0], count)
     origins[np.arange(count), axes] = ends * (1 + OUTSIDE)
     directions = random.normal(size=(count, 3))
     directions[np.arange(count), axes] = ends * np.abs(directions[np.arange(count), axes])
-    solid = np.vstack([faces, sides + len(vertices)]).astype(np.int32)
-    usual = Rays(np.vstack([vertices * RADIUS, room]), solid, origins, directions)
+    solid = np.vstack([faces, room.faces + len(vertices)]).astype(np.int32)
+    usual = Rays(np.vstack([vertices * RADIUS, room.vertices]), solid, origins, directions)
     usual = usual.typed(np.float32, "watertight")
     return Cliff("leaving", "compressed nodes", replace(usual, nodes="compressed"), usual, LEAVING)
 

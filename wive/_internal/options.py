@@ -26,8 +26,8 @@ MOST_THREADS = 4096
 MOST_BYTES = 2**63 - 1
 
 
-class BuildOptions(TypedDict, total=False):
-    """The options of `Scene` that all its constructors take."""
+class TreeOptions(TypedDict, total=False):
+    """The options of a tree and of what traces it."""
 
     backend: str
     device: str | None
@@ -35,6 +35,11 @@ class BuildOptions(TypedDict, total=False):
     nodes: NodesOption
     quality: QualityOption
     threads: int | None
+
+
+class BuildOptions(TreeOptions, total=False):
+    """The options of `Scene` that all its constructors take."""
+
     progress: ProgressOption
 
 
