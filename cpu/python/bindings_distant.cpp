@@ -98,7 +98,7 @@ py::object bring_near(const Array<double>& origins, const Array<double>& directi
         const Double3 direction = Double3::load(directions.data() + 3 * i);
         const float least = tmin.data()[tmin.size() == 1 ? 0 : i], greatest = tmax.data()[tmax.size() == 1 ? 0 : i];
         double step = kept && rays.are_floats(i) ? 0 : distance.step(origin, direction);
-        // Hits near the scene have a t of about the step: where float can't hold that, the ray stays.
+        // Hits have a t of about `step`. If that could overflow float, the ray is not moved.
         if (std::abs(step) > most_t / 2) step = 0;
         double start[3];
         distance.start(origin, direction, step).store(start);
