@@ -141,17 +141,25 @@ concept RayQuery = std::same_as<decltype(Q::interval), Interval<Real>> &&  // in
                        typename Q::InFlight;  // the variant of the query for rays in flight
                        // Whether children are visited front to back, because the interval shrinks with every hit.
                        { Q::in_order } -> std::convertible_to<bool>;
+                       // Whether it uses u and v of the hits that it is offered.
+                       { Q::wants_uv } -> std::convertible_to<bool>;
                        // Whether hits are crossings: a ray through an edge or a vertex of a closed surface hits it as
                        // often as a ray beside it. Otherwise triangles are closed. `fast` ignores it.
                        { query.crossings } -> std::convertible_to<bool>;
                        query.write(hits, i, unscale);  // writes the result of ray i; unscale: see RayFrame
                    };
 
+// A query that wants only the number of hits in its interval.
+template <class Q>
+concept CountingQuery = requires(Q query, unsigned hits) {
+    { query.take(hits) } -> std::same_as<bool>;  // takes the number of hits in a block; true once the query is done
+};
+
 // A query that checks itself whether a hit lies in the interval; prim is that of the triangle.
 template <class Q, class Real>
-concept OfferedQuery = RayQuery<Q, Real> && requires(Q query, Real x, std::uint32_t prim) {
-    { query.offer(x, x, x, prim) } -> std::same_as<bool>;  // takes t, u and v; true once the query is done
-};
+concept OfferedQuery = RayQuery<Q, Real> && (CountingQuery<Q> || requires(Q query, Real x, std::uint32_t prim) {
+                           { query.offer(x, x, x, prim) } -> std::same_as<bool>;  // takes t, u and v; true: done
+                       });
 
 // The test of a ray against a block of four triangles.
 template <class T, class Corners, class Query>

@@ -163,7 +163,8 @@ private:
 
     // Tests one block per flight. The rest of its leaf stays on top of the stack, so that the next block is prefetched
     // and tested a round later. First find() runs on all blocks; then solve() on the few blocks with a possible hit,
-    // without a branch on whether there is one; then their flights are enqueued, whose intervals are known only now.
+    // without a branch on whether there is one. Flights with an order are enqueued after that, because what they pop
+    // depends, by a branch, on intervals that are known only then.
     [[gnu::noinline]] void test_leaves() {
         const BvhView bvh = bvh_;
         State** const last = ends_.leaf;
@@ -188,13 +189,13 @@ private:
         }
         for (const Candidate* c = candidates_; c != end; ++c) {
             State& f = *c->flight;
-            if (Triangles<I>(f.ray).solve(Corners(*c->block), c->found, f.query)) {
-                f.top = Stack::Top(f.stack);
-                f.top.move(-1);
-                if (!c->last_block) f.counters.leaf();
-            }
+            const bool done = Triangles<I>(f.ray).solve(Corners(*c->block), c->found, f.query);
+            f.top.move_to_end_if(done, f.stack);
+            if (done && !c->last_block) f.counters.leaf();
+            if constexpr (!Query::in_order) enqueue(bvh, f, c->last_block, true, ends);
         }
-        for (const Candidate* c = candidates_; c != end; ++c) enqueue(bvh, *c->flight, c->last_block, true, ends);
+        if constexpr (Query::in_order)
+            for (const Candidate* c = candidates_; c != end; ++c) enqueue(bvh, *c->flight, c->last_block, true, ends);
         ends_ = ends;
         assert_queues_fit();
     }

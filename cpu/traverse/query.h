@@ -45,6 +45,7 @@ struct ClosestHit {
     using InFlight = ClosestHit<Real, true>;
     static constexpr bool in_order = true;
     static constexpr bool crossings = false;
+    static constexpr bool wants_uv = true;
 
     Interval<Real> interval;  // ends at the best hit
     HitWords<Real> best;
@@ -79,30 +80,34 @@ struct AnyHit {
     using InFlight = AnyHit;
     static constexpr bool in_order = false;  // cheaper, and fewer steps: the builder puts likely occluders last
     static constexpr bool crossings = false;
+    static constexpr bool wants_uv = false;
 
     Interval<Real> interval{};
     bool hit = false;
 
-    [[gnu::always_inline]] bool offer(Real t, Real, Real, std::uint32_t) {
-        hit = interval.holds(t);
-        return hit;
-    }
+    [[gnu::always_inline]] bool take(unsigned hits) { return hit |= hits != 0; }
     // Takes a hit that is known to lie in the interval; exact tests call this, with t in the caller's units.
-    static constexpr bool wants_uv = false;
     [[gnu::always_inline]] bool accept(Real, Real, Real, std::uint32_t) { return hit = true; }
     [[gnu::always_inline]] void write(const HitBatch<Real>& hits, std::size_t i, Real) const { hits.occluded[i] = hit; }
 };
 
-// Offers the hits in the lanes of a mask; true once the query is done.
-template <class Block, class Real, OfferedQuery<Real> Query>
+// Offers the hits in the lanes of a mask; true once the query is done. A query that only counts them takes all at once:
+// for rays that leave a surface, a branch per hit on whether it lies in the interval is mispredicted half of the time.
+template <class I, class Block, class Real, OfferedQuery<Real> Query>
 [[gnu::always_inline]] inline bool offer_lanes(const Block& block, unsigned hit_mask, const Real (&ts)[4],
                                                const Real (&us)[4], const Real (&vs)[4], Query& query) {
-    for (; hit_mask != 0; hit_mask &= hit_mask - 1) {
-        const int lane = __builtin_ctz(hit_mask);
-        assert(lane < block_width && block.prim_at(lane) >= 0);
-        if (query.offer(ts[lane], us[lane], vs[lane], static_cast<std::uint32_t>(block.prim_at(lane)))) return true;
+    if constexpr (CountingQuery<Query>) {
+        using Real4 = typename I::Real4;
+        const Real4 t = Real4::load(ts), tmin = Real4::all(query.interval.tmin), tmax = Real4::all(query.interval.tmax);
+        return query.take(static_cast<unsigned>(std::popcount(hit_mask & less_equal(tmin, t) & less_equal(t, tmax))));
+    } else {
+        for (; hit_mask != 0; hit_mask &= hit_mask - 1) {
+            const int lane = __builtin_ctz(hit_mask);
+            assert(lane < block_width && block.prim_at(lane) >= 0);
+            if (query.offer(ts[lane], us[lane], vs[lane], static_cast<std::uint32_t>(block.prim_at(lane)))) return true;
+        }
+        return false;
     }
-    return false;
 }
 
 }  // namespace wive::WIVE_ISA

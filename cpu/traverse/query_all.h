@@ -12,17 +12,17 @@ template <class Real>
 struct CountHits {
     using InFlight = CountHits;
     static constexpr bool in_order = false;  // every hit is wanted, and none ends the interval
+    static constexpr bool wants_uv = false;
 
     Interval<Real> interval{};
     bool crossings = true;
     std::int32_t count = 0;
 
-    [[gnu::always_inline]] bool offer(Real t, Real, Real, std::uint32_t) {
-        count += interval.holds(t);
+    [[gnu::always_inline]] bool take(unsigned hits) {
+        count += static_cast<std::int32_t>(hits);
         return false;
     }
     // Takes a hit that is known to lie in the interval; exact tests call this, with t in the caller's units.
-    static constexpr bool wants_uv = false;
     [[gnu::always_inline]] bool accept(Real, Real, Real, std::uint32_t) {
         ++count;
         return false;
@@ -35,6 +35,7 @@ template <class Real>
 struct AllHits {
     using InFlight = AllHits;
     static constexpr bool in_order = false;
+    static constexpr bool wants_uv = true;
 
     Interval<Real> interval{};
     bool crossings = true;
@@ -50,7 +51,6 @@ struct AllHits {
         }
         return false;
     }
-    static constexpr bool wants_uv = true;
     [[gnu::always_inline]] bool accept(Real t, Real u, Real v, std::uint32_t prim) {
         found->add({ray, t, u, v, static_cast<std::int32_t>(prim)});
         ++count;

@@ -35,6 +35,11 @@ struct alignas(64) Stack {
             bottom_ = stack.distances;
 #endif
         }
+        // Moves to the entry that ends the traversal if `ends`, without a branch.
+        [[gnu::always_inline]] void move_to_end_if(bool ends, Stack& stack) {
+            float* const end = stack.distances + sentinels - 1;
+            distance_ += (end - distance_) & -static_cast<std::ptrdiff_t>(ends);
+        }
         [[gnu::always_inline]] float& distance(std::ptrdiff_t i = 0) const { return distance_[i]; }
         [[gnu::always_inline]] std::uint32_t& child(std::ptrdiff_t i = 0) const {
             return *reinterpret_cast<std::uint32_t*>(reinterpret_cast<std::byte*>(distance_ + i) +

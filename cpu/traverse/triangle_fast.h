@@ -65,7 +65,7 @@ public:
         flip_sign(dot(e2, q), found.det).store(ts);
         (found.u / size).store(us);
         (found.v / size).store(vs);
-        return offer_lanes(corners.block, found.hit_mask, ts, us, vs, query);
+        return offer_lanes<I>(corners.block, found.hit_mask, ts, us, vs, query);
     }
 
 private:

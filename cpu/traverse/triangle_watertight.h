@@ -85,10 +85,10 @@ public:
             const unsigned may_be_hit = found.hit_mask & ~ray_.edge_on(corners, ray_.direction);
             if (may_be_hit == 0) return false;
             const Sheared<Corners> sheared(*this, corners);
-            Float64Hits<I> hits;
+            Float64Hits<I, Query::wants_uv> hits;
             const unsigned hit_mask = hits.solve(may_be_hit, sheared.x, sheared.y, sheared.z, sheared.weight,
                                                  ray_.direction[axis_[2]], query.crossings);
-            return offer_lanes(corners.block, hit_mask, hits.t, hits.u, hits.v, query);
+            return offer_lanes<I>(corners.block, hit_mask, hits.t, hits.u, hits.v, query);
         } else {
             unsigned hit_mask = found.hit_mask;
             Float4 side = found.side;
@@ -98,8 +98,8 @@ public:
                 if (hit_mask == 0) return false;
             }
             alignas(16) float ts[4], us[4], vs[4];
-            intersect(corners, hit_mask, side, ts, us, vs);
-            return offer_lanes(corners.block, hit_mask, ts, us, vs, query);
+            intersect<Query::wants_uv>(corners, hit_mask, side, ts, us, vs);
+            return offer_lanes<I>(corners.block, hit_mask, ts, us, vs, query);
         }
     }
 
@@ -126,11 +126,12 @@ private:
         }
     };
 
-    // Computes t, u and v in double and rounds them once. x and y are scaled by the longest component of the direction,
-    // which saves the divisions. If the ray hits only the triangle with rounded corners, a weight has the wrong sign
-    // here, or all weights together are no more than rounding of their products leaves. t, u and v are then those of
-    // the rounded triangle, whose weights are exact but for one rounding, so that t lies within the box (frame.h).
-    template <class Corners>
+    // Computes t and, if wanted, u and v in double and rounds them once. x and y are scaled by the longest component of
+    // the direction, which saves the divisions. If the ray hits only the triangle with rounded corners, a weight has
+    // the wrong sign here, or all weights together are no more than rounding of their products leaves. t, u and v are
+    // then those of the rounded triangle, whose weights are exact but for one rounding, so that t lies within the box
+    // (frame.h).
+    template <bool wants_uv, class Corners>
     [[gnu::always_inline]] void intersect(const Corners& corners, unsigned hit_mask, Float4 side, float (&ts)[4],
                                           float (&us)[4], float (&vs)[4]) const {
         const Double4 forward = Double4::all(ray_.direction[axis_[2]]);
@@ -153,11 +154,13 @@ private:
         }
         const Double4 det = weight[0] + weight[1] + weight[2];
         const Double4 lowest = min(min(weight[0], weight[1]), weight[2]);
-        const Double4 inverse = Double4::all(1.0) / det;
         const Double4 height = weight[0] * z[0] + weight[1] * z[1] + weight[2] * z[2];
         Float4::narrow(height / (det * forward)).store(ts);
-        Float4::narrow(weight[1] * inverse).store(us);
-        Float4::narrow(weight[2] * inverse).store(vs);
+        if constexpr (wants_uv) {
+            const Double4 inverse = Double4::all(1.0) / det;
+            Float4::narrow(weight[1] * inverse).store(us);
+            Float4::narrow(weight[2] * inverse).store(vs);
+        }
         const unsigned inside = less_equal(zero, lowest) & ~less_equal(det, largest * Double4::all(least_weight));
         if (const unsigned rounded = hit_mask & ~inside; rounded != 0) [[unlikely]]
             intersect_rounded(corners.block, rounded, ts, us, vs);

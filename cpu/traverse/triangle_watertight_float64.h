@@ -26,8 +26,8 @@ namespace wive::WIVE_ISA {
     return ((a - b) + low) + rounded_off_sum(a_low, b_low, low);
 }
 
-// t, u and v of the hits in a block.
-template <Isa I>
+// t and, if wanted, u and v of the hits in a block.
+template <Isa I, bool wants_uv>
 class Float64Hits {
     using Double4 = typename I::Double4;
 
@@ -41,8 +41,10 @@ public:
         const Double4 det = weight[0] + weight[1] + weight[2], zero = Double4::all(0.0);
         const Double4 height = weight[0] * z[0] + weight[1] * z[1] + weight[2] * z[2];
         (height / (det * Double4::all(forward))).store(t);
-        (weight[1] / det).store(u);
-        (weight[2] / det).store(v);
+        if constexpr (wants_uv) {
+            (weight[1] / det).store(u);
+            (weight[2] / det).store(v);
+        }
         const Double4 least = max(largest(x) * largest(y) * Double4::all(0x1p-26), Double4::all(smallest_det));
         const unsigned doubt = hit_mask & (less_equal(abs(det), least) | equal(weight[0], zero) |
                                            equal(weight[1], zero) | equal(weight[2], zero));
