@@ -79,9 +79,14 @@ def measured(cliff: Cliff, effort: Effort) -> report.Row:
 def closest_hits(rays: Rays) -> Callable[[], None]:
     """A function that traces the rays once; it has run before."""
     scene = wive.Scene(rays.vertices, rays.faces, accuracy=rays.accuracy, nodes=rays.nodes)
+    tree = _cpu.Bvh(rays.vertices, rays.faces, rays.accuracy, nodes=rays.nodes)
+    limits = np.zeros(1, rays.origins.dtype), np.full(1, np.inf, rays.origins.dtype)
 
     def trace() -> None:
-        scene.intersect(rays.origins, rays.directions, threads=1)
+        if rays.one_by_one:
+            tree.intersect(scene.backend, rays.origins, rays.directions, *limits, threads=1, in_flight=1)
+        else:
+            scene.intersect(rays.origins, rays.directions, threads=1)
 
     trace()
     return trace

@@ -33,6 +33,7 @@ class Rays:
     directions: Floats
     accuracy: AccuracyOption = "watertight"
     nodes: NodesOption = "float32"
+    one_by_one: bool = False  # instead of as a batch
 
     def typed(self, dtype: type[np.floating], accuracy: AccuracyOption) -> "Rays":
         """The same in this dtype and accuracy."""
@@ -66,7 +67,7 @@ def cliffs(count: int, levels: int) -> Iterator[Cliff]:
     yield from _distance(count, levels)
     yield from _plane(min(count, 500))
     yield from _doubt(count, levels)
-    yield _leaving(count, levels)
+    yield from _leaving(count, levels)
 
 
 def _scale(count: int, levels: int) -> Iterator[Cliff]:
@@ -128,7 +129,7 @@ def _doubt(count: int, levels: int) -> Iterator[Cliff]:
         yield Cliff("doubt", case, rays.typed(np.float32, "exact"), rays.typed(np.float32, "fast"), IN_DOUBT)
 
 
-def _leaving(count: int, levels: int) -> Cliff:
+def _leaving(count: int, levels: int) -> Iterator[Cliff]:
     """Rays from the outer side of a room around the ball, outwards, in both node forms."""
     random = np.random.default_rng(4)
     import trimesh
@@ -143,7 +144,9 @@ def _leaving(count: int, levels: int) -> Cliff:
     solid = np.vstack([faces, room.faces + len(vertices)]).astype(np.int32)
     usual = Rays(np.vstack([vertices * RADIUS, room.vertices]), solid, origins, directions)
     usual = usual.typed(np.float32, "watertight")
-    return Cliff("leaving", "compressed nodes", replace(usual, nodes="compressed"), usual, LEAVING)
+    for case, one_by_one in (("compressed nodes", False), ("compressed nodes, one by one", True)):
+        rays = replace(usual, one_by_one=one_by_one)
+        yield Cliff("leaving", case, replace(rays, nodes="compressed"), rays, LEAVING)
 
 
 def _ball_above_ground(size: float, count: int, levels: int) -> Rays:

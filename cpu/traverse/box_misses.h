@@ -13,6 +13,29 @@
 
 namespace wive::WIVE_ISA {
 
+// By how much boxes are enlarged here, over the largest coordinate of an origin and of the box, relative to the tree's
+// centre: rounding and the triangle test (frame.h) add up to less than 20u of that. Below the other limit slack might
+// underflow.
+inline constexpr float box_slack = 0x1p-19f, least_box_distance = 0x1p-90f;
+
+// Whether ray i starts outside of the tree's extent on an axis, leads away from it there and has no tmin before its
+// origin. Planes of a compressed root lie outside of the extent, so that rays which leave the tree would visit nodes.
+template <Isa I>
+[[gnu::always_inline]] inline bool leads_away(const BvhView& bvh, const RayBatch<typename I::Real>& rays,
+                                              std::size_t i) {
+    using Real4 = typename I::Real4;
+    using Float4 = typename I::Float4;
+    const auto *o = rays.origins + 3 * i, *d = rays.directions + 3 * i;
+    const Float4 extent = Float4::load(bvh.extent), center = Float4::load(bvh.center);
+    const Float4 origin = Float4::narrow(Real4::set(o[0], o[1], o[2], 0) - Real4::of(center)), size = abs(origin);
+    const unsigned outside = less(extent, size);
+    if (outside == 0) return false;  // most rays, and what follows would cost them 3 %
+    const float distance = highest_lane(size) + highest_lane(extent);
+    const unsigned beyond_slack = less(extent + Float4::all(distance * box_slack), size);
+    const unsigned towards = sign_bits(origin) ^ sign_bits(Float4::narrow(Real4::set(d[0], d[1], d[2], 0)));
+    return (beyond_slack & ~towards) != 0 && distance >= least_box_distance && rays.tmin[i * rays.tmin_stride] >= 0;
+}
+
 // A ray from outside that misses costs as much as several nodes: it is loaded, queued and written. So blocks of rays
 // are tested first, as long as some of them miss; then more and more rays are taken untested before the next block.
 template <Isa I, NodeLayout<I> Layout>
@@ -71,12 +94,10 @@ private:
     // The mask of those of rays [first, first + 4) that miss the box. Seen along an axis, the box is a rectangle and
     // the ray a line; if all corners of the rectangle lie on one side of the line, the ray misses. This takes no
     // division. A ray also misses if it starts outside of the box on an axis and leads away from it on that axis.
-    // Relative to the tree's centre, with O the origin's and P the planes' largest coordinate, rounding and the
-    // triangle test (frame.h) add up to less than 20u (O + P); the box is enlarged by 32u (O + P). Components of the
-    // direction count as at least 2^-30 of the longest, so that underflow is less than that slack if O + P and its
-    // product with the longest are in range.
+    // Components of the direction count as at least 2^-30 of the longest, so that underflow is less than the slack of
+    // the box if the distance that it goes by and its product with the longest component are in range.
     unsigned misses_of_four(std::size_t first) const {
-        constexpr float slack_factor = 0x1p-19f, smallest_part = 0x1p-30f, least = 0x1p-90f, most = 0x1p120f;
+        constexpr float smallest_part = 0x1p-30f, most = 0x1p120f;
         const auto load = [](const Real* from, std::size_t stride) {
             return Real4::set(from[0], from[stride], from[2 * stride], from[3 * stride]);
         };
@@ -93,7 +114,7 @@ private:
         for (unsigned axis = 0; axis < 3; ++axis) {
             origin[axis] = origin[axis] - Float4::all(middle_[axis]);
             size[axis] = max(abs(direction[axis]), longest * Float4::all(smallest_part));
-            reach[axis] = Float4::all(half_[axis]) + distance * Float4::all(slack_factor);
+            reach[axis] = Float4::all(half_[axis]) + distance * Float4::all(box_slack);
         }
         const std::size_t stride = rays_.tmin_stride;
         const unsigned ahead = less_equal(Real4::all(0), load(rays_.tmin + first * stride, stride));
@@ -106,7 +127,7 @@ private:
                 ahead & less(reach[axis], abs(origin[axis])) & ~(sign_bits(origin[axis]) ^ sign_bits(direction[axis]));
         }
         const Float4 magnitude = distance * longest;
-        misses &= less_equal(Float4::all(least), min(distance, magnitude));
+        misses &= less_equal(Float4::all(least_box_distance), min(distance, magnitude));
         return misses & less_equal(magnitude, Float4::all(most)) & 15u;
     }
 

@@ -19,6 +19,7 @@
 
 #include "core/layout.h"
 #include "core/ray.h"
+#include "traverse/box_misses.h"
 #include "traverse/concepts.h"
 #include "traverse/counters.h"
 #include "traverse/frame.h"
@@ -195,13 +196,17 @@ template <Isa I, template <class> class Slabs, template <class> class Triangles,
     requires Traversable<I, Slabs, Triangles, Query>
 void trace_one_by_one(const BvhView& bvh, const RayBatch<typename I::Real>& rays,
                       const HitBatch<typename I::Real>& hits, const RaySource& source) {
+    const auto is_known_to_miss = [&](std::size_t i) {
+        if constexpr (Slabs<I>::Layout::boxes_are_nested || !std::is_same_v<Counters, NoCounters>) return false;
+        return leads_away<I>(bvh, rays, i);
+    };
     for (std::size_t begin, end; source.take(begin, end);)
         for (std::size_t i = begin; i < end; ++i) {
             typename Triangles<I>::Frame ray;
             Query query{};
             Counters counters;
             ray.unscale = 1;
-            if (ray.load(bvh, rays, i)) {
+            if (!is_known_to_miss(i) && ray.load(bvh, rays, i)) {
                 query = start_query<Query>(ray, hits, i);
                 traverse<I, Slabs, Triangles>(bvh, ray, query, counters);
             }
