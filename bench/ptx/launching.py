@@ -17,6 +17,7 @@ from warp._src.context import pack_arg
 from warp._src.types import launch_bounds_t
 
 from bench.ptx.translation import translate
+from wive.warp_kernels.launching import launch as wive_launches
 
 HERE = Path(__file__).parent
 COMPILER = shlex.split(os.environ.get("CXX", "c++"))
@@ -108,9 +109,10 @@ def on_the_host(made: Any = host_kernel, seed: int = 1) -> Iterator[None]:
         blocks = math.ceil(math.prod(shape) / block_dim)
         made(kernel, block_dim).run([launch_bounds_t(shape), *arguments], blocks, block_dim, seed)
 
-    real = wp.launch
-    wp.launch = launch
-    try:
+    # What is launched is what a CUDA device would get, though arrays are the CPU device's.
+    changed = [(wp, "launch", launch), (wive_launches, "loops_in_warps", lambda device, lanes: True)]
+    with contextlib.ExitStack() as undo:
+        for place, name, value in changed:
+            undo.callback(setattr, place, name, getattr(place, name))
+            setattr(place, name, value)
         yield
-    finally:
-        wp.launch = real

@@ -18,6 +18,7 @@ from wive.warp_kernels.lanes.lanes import lanes_of
 from wive.warp_kernels.lanes.warps import collectives, warp_of
 from wive.warp_kernels.launching.kernels import make_kernel
 from wive.warp_kernels.launching.launch import (
+    MOST_CPU_TURNS,
     MOST_CUDA_THREADS,
     MOST_TURNS,
     default_block_dim,
@@ -134,7 +135,9 @@ def test_warps_of_a_launch_have_room_for_all_rays(lanes: Any, block_dim: int) ->
         for device in (gpu, wp.get_device("cpu")):
             turns = turns_of(device, count)
             threads = threads_of(count, turns, lanes, block_dim)
-            assert 1 <= turns <= MOST_TURNS and threads % block_dim == 0
+            assert (
+                1 <= turns <= (MOST_TURNS if device is gpu else MOST_CPU_TURNS) and threads % block_dim == 0
+            )
             warps = threads // block_dim * -(-block_dim // 32) if device is gpu else threads * lanes // 8
             rays_at_once = 32 * lanes // 8 if device is gpu else 1
             assert warps * rays_at_once * turns >= count

@@ -1,6 +1,7 @@
 """Every query, accuracy and backend on the same rays: the Warp forms answer bit for bit as the C++ core."""
 
 import dataclasses
+import itertools
 from collections.abc import Callable
 
 import numpy as np
@@ -12,6 +13,7 @@ from support.hard_rays import HARD_MESHES, hard_rays
 from support.meshes import random_rays, soup, sphere
 from support.warp_launches import INFINITE, STACK, ZERO, assert_bit_identical, cpu_answers, warp_answers
 
+import wive
 from wive import _cpu, warp_kernels
 
 pytestmark = pytest.mark.timeout(120)
@@ -126,6 +128,30 @@ def test_hard_rays_give_the_same_bits_in_every_form(mesh: str, accuracy: str, no
     reference = cpu_answers(bvh, "scalar", origins, directions, tmin)
     for lanes in (8, 1):
         assert_bit_identical(warp_answers(bvh, lanes, origins, directions, tmin), reference)
+
+
+@pytest.mark.parametrize("nodes", FORMS)
+@pytest.mark.parametrize("accuracy", ACCURACIES)
+def test_rays_that_touch_the_box_of_the_tree_keep_their_hits(accuracy: str, nodes: str) -> None:
+    """Kernels without counters do not trace rays that miss this box."""
+    for mesh in ("sphere", "sphere far away", "integer grid", "one triangle", "empty"):
+        vertices, faces = HARD_MESHES[mesh]()
+        origins, directions = hard_rays(vertices, faces) if len(faces) else random_rays(50, 8)
+        corners = np.array(
+            list(itertools.product(*zip(vertices.min(axis=0), vertices.max(axis=0), strict=True)))
+        )
+        sides = corners[:, None] - corners
+        origins = np.concatenate([origins, np.repeat(corners, 8, axis=0) - 3 * sides.reshape(-1, 3)])
+        directions = np.concatenate([directions, sides.reshape(-1, 3)])
+        scene, core = (
+            wive.Scene(vertices, faces, accuracy=accuracy, nodes=nodes, **options)
+            for options in ({"device": "cpu"}, {"backend": "scalar"})
+        )
+        for tmin in (0.0, -np.inf):
+            found, wanted = (one.intersect(origins, directions, tmin=tmin) for one in (scene, core))
+            assert (wanted.prim >= 0).any() == (len(faces) > 0)
+            for name in ("t", "prim", "uv"):
+                np.testing.assert_array_equal(getattr(found, name), getattr(wanted, name), err_msg=mesh)
 
 
 def test_empty_and_exact_intervals_are_kept_to() -> None:

@@ -13,7 +13,7 @@ from wive.warp_kernels.lanes.layout import NO_PRIM
 from wive.warp_kernels.lanes.precision import PRECISIONS, in_double
 from wive.warp_kernels.queries.frame import make_load_frame
 from wive.warp_kernels.queries.query_exact import query_of
-from wive.warp_kernels.traversal.traversal import make_traversal
+from wive.warp_kernels.traversal.alone import make_traversal
 from wive.warp_kernels.tree.handle import CORRUPTION, HANDLES, HITS, KINDS, REFUSAL, USERS_STACK
 
 
@@ -46,8 +46,7 @@ def make_functions(
     begin_closest, distance = closest.begin, closest.distance
     begin_any, begin_count = any_.begin, count.begin
     trace_closest, trace_any, trace_count = (
-        make_traversal(name, accuracy, USERS_STACK, precision=precision)
-        for name in ("closest", "any", "count")
+        make_traversal(name, accuracy, USERS_STACK, precision) for name in ("closest", "any", "count")
     )
 
     @wp.func

@@ -24,12 +24,12 @@ _SLOPES = f"""
     const float* begin = (const float*)units + node;
     const wp::uint32 step_bits = wp::cast<wp::uint32>(grid[3]) << (23 - 8 * axis) & 0x7f800000u;
     const float step = wp::cast<float>(wp::uint32(step_bits));
-    const float near_step = step * rdir[0], far_step = step * rdir[1];
+    const float near_step = step * near_rdir, far_step = step * far_rdir;
 #if defined(__CUDA_ARCH__)
-    const float near_base = __fmaf_rn(grid[axis], rdir[0], bias[0]);
-    const float far_base = __fmaf_rn(grid[axis], rdir[1], bias[1]);
+    const float near_base = __fmaf_rn(grid[axis], near_rdir, near_bias);
+    const float far_base = __fmaf_rn(grid[axis], far_rdir, far_bias);
 #else
-    const float near_base = grid[axis] * rdir[0] + bias[0], far_base = grid[axis] * rdir[1] + bias[1];
+    const float near_base = grid[axis] * near_rdir + near_bias, far_base = grid[axis] * far_rdir + far_bias;
 #endif
 """
 BYTE_DISTANCES_8 = f"""

@@ -21,6 +21,7 @@ from wive.warp_kernels.lanes.native import (
     DISTANCES_1,
     DISTANCES_8,
     DOUBLE_TRIANGLES_4,
+    LARGER,
     PRODUCT,
     PRODUCTS,
     ROUNDED_AS_WRITTEN,
@@ -31,6 +32,7 @@ from wive.warp_kernels.lanes.native import (
     TRIANGLES_4,
     shared_stack_code,
 )
+from wive.warp_kernels.lanes.vectors import vector_code
 from wive.warp_kernels.lanes.warps import collectives, expected_lanes
 
 
@@ -89,6 +91,16 @@ def product_double(a: wp.float64, b: wp.float64) -> wp.float64:
     ...
 
 
+@wp.func_native(LARGER)
+def larger(a: float, b: float) -> float:
+    """The larger of two numbers; of NaN and a number, either."""
+    ...
+
+
+@wp.func_native(LARGER)
+def larger(a: wp.float64, b: wp.float64) -> wp.float64: ...
+
+
 @wp.func_native("return (wp::uint64)units.data;")
 def address_of(units: wp.array(dtype=wp.float32)) -> wp.uint64:
     """Address of the tree: one register to pass on instead of an array's dozen."""
@@ -126,7 +138,7 @@ def lanes_of(length: int, stack_words: int, precision: str) -> SimpleNamespace:
     stack_words_code = STACK_8 if eight else STACK_1
     stack_argument = wp.ref[stack_type] if eight else wp.uint64
 
-    @wp.func_native(DISTANCES_8 if eight else DISTANCES_1)
+    @wp.func_native(vector_code(DISTANCES_8, vector) if eight else DISTANCES_1)
     def plane_distances(
         units: wp.uint64, node: int, lane: int, row: int, rdir: float, bias: float
     ) -> vector: ...
@@ -136,7 +148,7 @@ def lanes_of(length: int, stack_words: int, precision: str) -> SimpleNamespace:
 
     if eight:
 
-        @wp.func_native(TRIANGLES_4 if precision == "float32" else DOUBLE_TRIANGLES_4)
+        @wp.func_native(vector_code(TRIANGLES_4 if precision == "float32" else DOUBLE_TRIANGLES_4, triangles))
         def load_triangles(row: wp.uint64, k: int) -> triangles: ...
     else:
         # Native code here makes NVRTC peel the loop over a leaf's blocks: six registers more on sm_100.
@@ -147,11 +159,7 @@ def lanes_of(length: int, stack_words: int, precision: str) -> SimpleNamespace:
         def load_triangles(row: wp.uint64, k: int):
             return triangles(load_number(row, corner_words * k))
 
-    @wp.func_native(
-        PRODUCTS.replace("LENGTH", str(triangles_length))
-        .replace("REAL", precision)
-        .replace("ROUNDED", rounded)
-    )
+    @wp.func_native(vector_code(PRODUCTS.replace("ROUNDED", rounded), triangles))
     def products(a: triangles, b: triangles) -> triangles: ...
 
     @wp.func_native(shared_stack_code(stack_words))

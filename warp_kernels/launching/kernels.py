@@ -30,12 +30,13 @@ def make_kernel(
     counters: bool = False,
     nodes: str = "float32",
     precision: str = "float32",
+    in_warps: bool = True,
 ) -> wp.Kernel:
     """The kernel of a query in QUERIES, to be launched with 8 // length threads per ray and turn.
 
     Its arguments are the tree's handle, origins, directions, tmin, tmax, turns and the outputs of that query.
     """
-    trace_share = make_loop(query, accuracy, length, stack_size, counters, nodes, precision)
+    trace_share = make_loop(query, accuracy, length, stack_size, counters, nodes, precision, in_warps)
     numbers = PRECISIONS[precision]
     vec2 = numbers.vec2
     tree, vectors, reals = (

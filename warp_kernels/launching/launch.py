@@ -26,7 +26,9 @@ SHARED_BYTES = 47 * 1024
 # have rays then.
 RESIDENT_WARPS = 24  # per multiprocessor
 MOST_TURNS = 16
-CPU_THREADS = 64  # Warp's CPU device runs them one after another
+# Warp's CPU device runs threads one after another, each of which makes a stack.
+CPU_THREADS = 64
+MOST_CPU_TURNS = 256
 
 
 def default_block_dim(lanes: int) -> int:
@@ -207,7 +209,10 @@ def _launch(
     block_dim = _expected_block_dim(tree, lanes, block_dim)
     if len(rays[0]) == 0:
         return
-    kernel = make_kernel(query, tree.accuracy, lanes, tree.stack, counters, tree.nodes, tree.precision)
+    in_warps = loops_in_warps(tree.device, lanes)
+    kernel = make_kernel(
+        query, tree.accuracy, lanes, tree.stack, counters, tree.nodes, tree.precision, in_warps
+    )
     turns = turns_of(tree.device, len(rays[0]))
     with cpu_blocks(lanes == 1 and tree.device.is_cpu):
         launch(
@@ -222,10 +227,16 @@ def _launch(
         )
 
 
+def loops_in_warps(device: wp.Device, lanes: Lanes) -> bool:
+    """Whether threads of a launch loop together: those of a warp on CUDA, or the fibers of a ray."""
+    return device.is_cuda or lanes == 1
+
+
 def turns_of(device: wp.Device, count: int) -> int:
     """How many rays there are per lane, of so many: all threads that the device holds at once have some."""
     threads = 32 * RESIDENT_WARPS * device.sm_count if device.is_cuda else CPU_THREADS
-    return max(1, min(MOST_TURNS, count // threads))
+    most = MOST_TURNS if device.is_cuda else MOST_CPU_TURNS
+    return max(1, min(most, count // threads))
 
 
 def threads_of(count: int, turns: int, lanes: Lanes, block_dim: int) -> int:

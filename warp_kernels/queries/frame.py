@@ -8,7 +8,7 @@ from typing import Any
 
 import warp as wp
 
-from wive.warp_kernels.lanes.lanes import rounded_as_written
+from wive.warp_kernels.lanes.lanes import larger, rounded_as_written
 from wive.warp_kernels.lanes.layout import SIGN_BIT
 from wive.warp_kernels.lanes.precision import PRECISIONS
 from wive.warp_kernels.queries.limits import make_scale_limits, next_above
@@ -119,9 +119,9 @@ def box_tmin(ray: RayFrame64):
 @wp.func
 def power_of(longest: float):
     """The largest power of two not above the longest component, which may be subnormal."""
-    up = wp.where(longest < LEAST_NORMAL, NORMALISE, 1.0)
-    exponent = wp.cast(longest * up, wp.uint32) >> wp.uint32(23)
-    return wp.cast(exponent << wp.uint32(23), wp.float32) / up
+    small = longest < LEAST_NORMAL
+    exponent = wp.cast(longest * wp.where(small, NORMALISE, 1.0), wp.uint32) >> wp.uint32(23)
+    return wp.cast(exponent << wp.uint32(23), wp.float32) * wp.where(small, 1.0 / NORMALISE, 1.0)
 
 
 @wp.func
@@ -166,7 +166,7 @@ def make_load_frame(accuracy: str, precision: str) -> wp.Function:
         rounded_as_written()
         ray = frame_type()
         lengths = vec3(wp.abs(direction[0]), wp.abs(direction[1]), wp.abs(direction[2]))
-        longest = wp.max(wp.max(lengths[0], lengths[1]), lengths[2])
+        longest = larger(larger(lengths[0], lengths[1]), lengths[2])
         ray.valid = longest > real(0.0) and tmin <= tmax
         for axis in range(3):
             if not (wp.abs(origin[axis]) <= max_coordinate and lengths[axis] <= max_component):
@@ -198,11 +198,11 @@ def make_load_frame(accuracy: str, precision: str) -> wp.Function:
 
         magnitude = float(0.0)
         for axis in range(3):
-            magnitude = wp.max(magnitude, wp.abs(relative[axis]))
+            magnitude = larger(magnitude, wp.abs(relative[axis]))
         magnitude = magnitude + LEAST_MAGNITUDE
         smallest = wp.float32(longest / ray.unscale) * SMALLEST_PART
         for axis in range(3):
-            size = 1.0 / wp.max(wp.abs(scaled[axis]), smallest)
+            size = 1.0 / larger(wp.abs(scaled[axis]), smallest)
             reciprocal = flip_sign(size, scaled[axis])
             distance = relative[axis] * reciprocal
             slack = size * (magnitude * SLACK_FACTOR)

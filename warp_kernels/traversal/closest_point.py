@@ -147,9 +147,10 @@ def make_closest_point(accuracy: str, stack_size: int, nodes: str, precision: st
         slots = used(grid)
         squared = vector(0.0)
         for axis in range(3):
-            scales = wp.vec2(frame.scale, -frame.scale)
-            biases = wp.vec2(frame.low_bias[axis], frame.high_bias[axis])
-            low, high = distances(units, begin, grid, 0, axis, low_row(axis), scales, biases)
+            row, low_bias, high_bias = low_row(axis), frame.low_bias[axis], frame.high_bias[axis]
+            low, high = distances(
+                units, begin, grid, 0, axis, row, frame.scale, -frame.scale, low_bias, high_bias
+            )
             for i in range(8):
                 gap = wp.max(wp.max(low[i], high[i]), -frame.beyond[axis])
                 squared[i] = squared[i] + gap * (gap + 2.0 * frame.beyond[axis])

@@ -5,9 +5,9 @@ from types import SimpleNamespace
 import warp as wp
 
 from wive.warp_kernels.lanes.lanes import byte_of, without_gradient
-from wive.warp_kernels.lanes.native import set_bit_if
 from wive.warp_kernels.lanes.precision import stack_numbers
-from wive.warp_kernels.queries.frame import box_tmin
+from wive.warp_kernels.lanes.vectors import make_bits, make_larger, make_smaller
+from wive.warp_kernels.queries.frame import box_tmax, box_tmin
 
 # What visits read of a ray, in words: one over its direction, the biases of near and far planes (three each),
 # tmin, and where its rows begin in nodes. They are kept in the stack's memory, because a traversal has few
@@ -39,10 +39,26 @@ def make_keep(lanes: SimpleNamespace, nodes: SimpleNamespace, box_base: int, fra
     return keep
 
 
-@wp.func_native(set_bit_if(("near", "<=", "far")))
-def with_bit_if_met(mask: wp.uint32, bit: wp.uint32, near: float, far: float) -> wp.uint32:
-    """The mask with the bit if a ray that enters a box at `near` and leaves it at `far` meets it."""
-    ...
+def make_meets_tree(frame_type: type) -> wp.Function:
+    """The function that says whether a ray meets the box of a tree, by the slab test of nodes.
+
+    It passes all rays that meet a box inside: distances to planes, rounded, keep the planes' order.
+    """
+
+    @without_gradient
+    @wp.func
+    def meets_tree(extent: wp.vec3, ray: frame_type):
+        entry = box_tmin(ray)
+        exit = box_tmax(ray.tmax)
+        for axis in range(3):
+            reach = extent[axis] * wp.abs(ray.rdir[axis])
+            near = ray.near_bias[axis] - reach
+            far = reach + ray.far_bias[axis]
+            entry = wp.where(near > entry, near, entry)
+            exit = wp.where(far < exit, far, exit)
+        return entry <= exit
+
+    return meets_tree
 
 
 def make_visit(
@@ -54,16 +70,18 @@ def make_visit(
     goes on top.
     """
     numbers = stack_numbers(lanes, "float32", box_base)
-    load, load_vector, load_word = numbers.load, numbers.load_vector, lanes.load_word
-    length = lanes.length
+    load, load_word = numbers.load, lanes.load_word
     vector, words = lanes.vector, lanes.words
     grid_of, distances, used = nodes.grid, nodes.distances, nodes.used
     order_of, below, lowest = nodes.order, nodes.below, nodes.lowest
-    store_if = entries.store_if
+    store_hits = entries.store_hits
     child_row: int = nodes.child_row
     load_row, collect = lanes.load_row, lanes.group_vote
     stack_argument = lanes.stack_argument
     alone: bool = lanes.length == 8
+
+    larger, smaller = make_larger(vector), make_smaller(vector)
+    met = make_bits(vector, ("low", "<=", "high"))
 
     @wp.func
     def slots_below(lane: int):
@@ -85,12 +103,7 @@ def make_visit(
         top: int,
     ):
         """(D) store: a hit goes above those that are farther."""
-        farther = below(order, hits)
-        first = lowest(order, top)
-        for i in range(length):
-            hit = own & (wp.uint32(1) << wp.uint32(lane + i))
-            behind = farther[i // 4] & wp.uint32(255 << (8 * (i % 4)))
-            store_if(stack, first, behind, hit, children[i], tnear[i])
+        store_hits(stack, lowest(order, top), below(order, hits), own, children, tnear, lane)
         return wp.int32(wp.bit_count(hits))
 
     @without_gradient
@@ -122,25 +135,23 @@ def make_visit(
             children = load_row(units, node, child_row, lane)
             # (B) slabs: the ray's octant says which row of an axis has its near planes.
             grid = grid_of(units, node)
-            r = load_vector(stack, RDIR)
-            near = load_vector(stack, NEAR_BIAS)
-            far = load_vector(stack, FAR_BIAS)
+            r = wp.vec3(load(stack, RDIR), load(stack, RDIR + 1), load(stack, RDIR + 2))
+            near = wp.vec3(load(stack, NEAR_BIAS), load(stack, NEAR_BIAS + 1), load(stack, NEAR_BIAS + 2))
+            far = wp.vec3(load(stack, FAR_BIAS), load(stack, FAR_BIAS + 1), load(stack, FAR_BIAS + 2))
             tmin = load(stack, BOX_TMIN)
             near_x, far_x = distances(
-                units, node, grid, lane, 0, byte_of(rows, 0), wp.vec2(r[0], r[0]), wp.vec2(near[0], far[0])
+                units, node, grid, lane, 0, byte_of(rows, 0), r[0], r[0], near[0], far[0]
             )
             near_y, far_y = distances(
-                units, node, grid, lane, 1, byte_of(rows, 1), wp.vec2(r[1], r[1]), wp.vec2(near[1], far[1])
+                units, node, grid, lane, 1, byte_of(rows, 1), r[1], r[1], near[1], far[1]
             )
             near_z, far_z = distances(
-                units, node, grid, lane, 2, byte_of(rows, 2), wp.vec2(r[2], r[2]), wp.vec2(near[2], far[2])
+                units, node, grid, lane, 2, byte_of(rows, 2), r[2], r[2], near[2], far[2]
             )
-            tnear = wp.max(wp.max(near_x, near_y), wp.max(near_z, vector(tmin)))
-            tfar = wp.min(wp.min(far_x, far_y), wp.min(far_z, vector(tmax)))
+            tnear = larger(larger(near_x, near_y), larger(near_z, vector(tmin)))
+            tfar = smaller(smaller(far_x, far_y), smaller(far_z, vector(tmax)))
             # (C) compress: a bit for each child hit.
-            for i in range(length):
-                own = with_bit_if_met(own, wp.uint32(1) << wp.uint32(lane + i), tnear[i], tfar[i])
-            own = own & used(grid)
+            own = met(tnear, tfar, lane) & used(grid)
             if wp.static(alone):
                 count = push(own, own, order, children, tnear, lane, stack, top)
         if wp.static(not alone):

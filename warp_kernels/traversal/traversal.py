@@ -11,7 +11,7 @@ from typing import Any
 import warp as wp
 
 from wive.warp_kernels.lanes.entries import entries_of
-from wive.warp_kernels.lanes.lanes import address_of, lanes_of, without_gradient
+from wive.warp_kernels.lanes.lanes import lanes_of, without_gradient
 from wive.warp_kernels.lanes.layout import END_OF_STACK, NO_PRIM, NODE_WIDTH, WORD_MASK
 from wive.warp_kernels.lanes.precision import PRECISIONS, stack_numbers
 from wive.warp_kernels.queries.frame import FRAMES, box_tmax
@@ -62,7 +62,8 @@ def make_steps(
 
     open(stack) comes first, and keep(ray, stack) before the steps of each ray. All threads of a warp take
     each step(...) together, to leaves or to inner nodes; those that are at the other or at their end keep
-    their traversal as it is. settled(...) is what a thread has found at the end.
+    their traversal as it is. settled(...) is what a thread has found at the end. What a step is made of is
+    there for threads alone, whose loop is in alone.py.
 
     The stack, a new_stack(), holds `stack_size` entries, and behind them what triangle tests, visits and
     queries need of the ray.
@@ -104,11 +105,22 @@ def make_steps(
 
     @without_gradient
     @wp.func
+    def keep_for_boxes(ray: frame_type, stack: stack_argument):
+        """Keep what visits, and limits of hits, need of a ray; leaves need what `prepare` keeps."""
+        keep_box(ray, stack)
+        store(stack, TMIN, ray.tmin)
+
+    @without_gradient
+    @wp.func
+    def tmin(stack: stack_argument):
+        return load(stack, TMIN)
+
+    @without_gradient
+    @wp.func
     def keep(ray: frame_type, stack: stack_argument):
         """Keep in the stack's memory what the steps need of a ray."""
         prepare(ray, stack)
-        keep_box(ray, stack)
-        store(stack, TMIN, ray.tmin)
+        keep_for_boxes(ray, stack)
         store(stack, UNSCALE, ray.unscale)
 
     @without_gradient
@@ -122,20 +134,28 @@ def make_steps(
     def number_kept(stack: stack_argument):
         return wp.int32(load_word(stack, number_at))
 
-    @without_gradient
-    @wp.func
-    def begin(ray: frame_type, found: found_type) -> walk_type:
-        """The traversal at the root."""
-        walk = walk_type()
-        walk.found = found
-        walk.tmax = box_tmax(ray.tmax)
-        walk.top = 1
-        return walk
-
     @wp.func
     def goes_on(child: int, to_leaf: bool):
         """Above zero if a traversal at this child takes a step to leaves, or to inner nodes."""
         return wp.where(to_leaf, END_OF_STACK - child, child - END_OF_STACK)
+
+    @wp.func
+    def is_sound(tree: tree_type, steps: int, top: int, begin: int):
+        """Whether a traversal may take a step to word `begin`: false if memory was overwritten."""
+        if steps > tree.step_limit or top > wp.static(stack_size - NODE_WIDTH):
+            return False
+        return begin < tree.units.shape[0]
+
+    @without_gradient
+    @wp.func
+    def nearest_left(stack: stack_argument, top: int, count: int, tmax: float):
+        """The highest entry from `top` down that is not behind the best hit: one just put there never is."""
+        found = int(top)
+        if wp.static(in_order):
+            if count == 0:
+                while distance_at(stack, found) > tmax:
+                    found -= 1
+        return found
 
     # Structs are changed field by field: one that is assigned as a whole under a condition takes its
     # registers twice on CUDA. Numbers that change under conditions are fields: as variables they would be
@@ -155,11 +175,7 @@ def make_steps(
         own.goes = goes_on(walk.child, to_leaf)
         if own.goes > 0:
             walk.steps += 1
-            if (
-                walk.steps > tree.step_limit
-                or walk.top > wp.static(stack_size - NODE_WIDTH)
-                or begin >= tree.units.shape[0]
-            ):
+            if not is_sound(tree, walk.steps, walk.top, begin):
                 tree.error[CORRUPTION] = 1
                 walk.child = END_OF_STACK
                 own.goes = 0
@@ -167,7 +183,7 @@ def make_steps(
             block_count = (walk.child & 7) + 1
             last = wp.uint32(0)
             if own.goes > 0:
-                leaf = test_leaf(units, begin, block_count, lane, stack, load(stack, TMIN), walk.found)
+                leaf = test_leaf(units, begin, block_count, lane, stack, tmin(stack), walk.found)
                 walk.found = leaf.found
                 last = wp.uint32(leaf.last)
             if wp.static(counters):
@@ -192,12 +208,7 @@ def make_steps(
                 if own.goes > 0:
                     walk.inner_nodes += 1
         if own.goes > 0:
-            walk.top += own.count - 1
-            if wp.static(in_order):
-                if own.count == 0:
-                    # Those that are behind the best hit are passed over; one just put there never is.
-                    while distance_at(stack, walk.top) > walk.tmax:
-                        walk.top -= 1
+            walk.top = nearest_left(stack, walk.top + own.count - 1, own.count, walk.tmax)
             walk.child = child_at(stack, walk.top)
         sync()
         return walk
@@ -219,43 +230,23 @@ def make_steps(
         return load(stack, UNSCALE)
 
     return SimpleNamespace(
+        prepare=prepare,
+        keep_for_boxes=keep_for_boxes,
         keep=keep,
+        tmin=tmin,
         open=entries.open,
         keep_number=keep_number,
         number_kept=number_kept,
-        begin=begin,
+        is_sound=is_sound,
+        visit=visit,
+        test_leaf=test_leaf,
+        count_triangles=count_triangles,
+        nearest_left=nearest_left,
+        child_at=child_at,
         step=step,
         settled=settled,
         unscale=unscale,
         new_stack=lanes.new_stack,
+        stack_argument=stack_argument,
         sync=sync,
     )
-
-
-@functools.cache
-def make_traversal(
-    query: str, accuracy: str, stack_size: int, nodes: str = "float32", precision: str = "float32"
-) -> wp.Function:
-    """The whole traversal of one ray by one thread, which need not be together with others.
-
-    traverse(tree, ray, found) continues from the state `found` and returns one of TRAVERSALS.
-    """
-    steps = make_steps(query, accuracy, 8, stack_size, False, nodes, precision)
-    open_stack, keep, begin, new_stack = steps.open, steps.keep, steps.begin, steps.new_stack
-    step = steps.step
-    tree_type, found_type = HANDLES[accuracy, precision], query_of(query, accuracy, precision).state
-    frame_type, walk_type = FRAMES[precision], TRAVERSALS[found_type]
-
-    @without_gradient
-    @wp.func
-    def traverse(tree: tree_type, ray: frame_type, found: found_type) -> walk_type:
-        units = address_of(tree.units)
-        stack = new_stack()
-        open_stack(stack)
-        keep(ray, stack)
-        walk = begin(ray, found)
-        while walk.child != END_OF_STACK:
-            walk = step(tree, units, 0, stack, walk, walk.child < 0)
-        return walk
-
-    return traverse

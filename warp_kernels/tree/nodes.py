@@ -2,7 +2,8 @@
 
 rows_of(octant) says where in a node the rows begin that rays of an octant need: a byte per axis for the near
 planes, and one for the order. grid(...) is what planes are relative to, and distances(...) are those to the
-near and to the far planes of an axis, along the ray from its origin: plane * rdir + bias.
+near and to the far planes of an axis, along the ray from its origin: plane * rdir + bias. (Numbers, not
+vectors: the compiler of Warp's CPU device passes short vectors to functions as integers.)
 
 order(...) is what a visit needs of the children's order; below(...) and lowest(...) say where on the stack a
 slot's child goes among the hits. used(grid) has a bit for each slot that has a child.
@@ -48,12 +49,14 @@ def float32_node(lanes: SimpleNamespace) -> SimpleNamespace:
         lane: int,
         axis: int,
         near_row: int,
-        rdir: wp.vec2,
-        bias: wp.vec2,
+        near_rdir: float,
+        far_rdir: float,
+        near_bias: float,
+        far_bias: float,
     ):
         far_row = near_row ^ FLOAT_ROW_BYTES
-        near = plane_distances(units, node, lane, near_row, rdir[0], bias[0])
-        return near, plane_distances(units, node, lane, far_row, rdir[1], bias[1])
+        near = plane_distances(units, node, lane, near_row, near_rdir, near_bias)
+        return near, plane_distances(units, node, lane, far_row, far_rdir, far_bias)
 
     @wp.func
     def used(grid: wp.vec4):
@@ -86,8 +89,10 @@ def compressed_node(lanes: SimpleNamespace) -> SimpleNamespace:
         lane: int,
         axis: int,
         near_row: int,
-        rdir: wp.vec2,
-        bias: wp.vec2,
+        near_rdir: float,
+        far_rdir: float,
+        near_bias: float,
+        far_bias: float,
     ) -> both_vectors: ...
 
     @wp.func
@@ -98,10 +103,14 @@ def compressed_node(lanes: SimpleNamespace) -> SimpleNamespace:
         lane: int,
         axis: int,
         near_row: int,
-        rdir: wp.vec2,
-        bias: wp.vec2,
+        near_rdir: float,
+        far_rdir: float,
+        near_bias: float,
+        far_bias: float,
     ):
-        both = byte_distances(units, node, grid, lane, axis, near_row, rdir, bias)
+        both = byte_distances(
+            units, node, grid, lane, axis, near_row, near_rdir, far_rdir, near_bias, far_bias
+        )
         near = vector()
         far = vector()
         for i in range(length):

@@ -8,8 +8,8 @@ from types import SimpleNamespace
 import warp as wp
 
 from wive.warp_kernels.lanes.lanes import lowest_lane, product, product_double, without_gradient
-from wive.warp_kernels.lanes.native import set_bit_if
 from wive.warp_kernels.lanes.precision import stack_numbers
+from wive.warp_kernels.lanes.vectors import make_bits, make_larger, make_smaller
 from wive.warp_kernels.queries.frame import RayFrame, axes_of, by_sheared_axis
 from wive.warp_kernels.triangles.sheared import edges_in_lanes, side_passed, sides_beside
 
@@ -21,6 +21,11 @@ ORIGIN = 3
 DIRECTION = 6
 SHEAR = 9
 RAY_WORDS = 11
+# Of the least and the largest edge function of a triangle: they do not differ in sign, one is zero, or the
+# least is negative.
+SAME_SIGN = (("low", ">=", "0"), ("high", "<=", "0"))
+TIED = (("low", "==", "0"), ("high", "==", "0"))
+NEGATIVE = (("low", "<", "0"),)
 # The least sum of the weights that is trusted, relative to the largest of their products.
 LEAST_WEIGHT = wp.constant(wp.float64(2.0**-28))
 
@@ -45,29 +50,15 @@ def edges_of(a: wp.vec3d, b: wp.vec3d, c: wp.vec3d):
     )
 
 
-@wp.func_native(set_bit_if(("low", ">=", "0"), ("high", "<=", "0")))
-def with_bit_if_inside(mask: wp.uint32, bit: wp.uint32, low: float, high: float) -> wp.uint32:
-    """The mask with the bit if the least and the largest edge function do not differ in sign."""
-    ...
-
-
-@wp.func_native(set_bit_if(("low", "==", "0"), ("high", "==", "0")))
-def with_bit_if_tied(mask: wp.uint32, bit: wp.uint32, low: float, high: float) -> wp.uint32:
-    """The mask with the bit if the least or the largest edge function is zero."""
-    ...
-
-
-@wp.func_native(set_bit_if(("low", "<", "0")))
-def with_bit_if_negative(mask: wp.uint32, bit: wp.uint32, low: float) -> wp.uint32:
-    """The mask with the bit if the least edge function is negative."""
-    ...
-
-
 def watertight_triangles(
     lanes: SimpleNamespace, blocks: SimpleNamespace, ray_base: int, precision: str, crossings: bool
 ) -> SimpleNamespace:
     """The test for a lane form and block form; its ray is kept from stack word `ray_base` on."""
     length: int = lanes.triangles_length
+    larger, smaller = make_larger(lanes.triangles), make_smaller(lanes.triangles)
+    same_sign, tied, negative_in = (
+        make_bits(lanes.triangles, *signs) for signs in (SAME_SIGN, TIED, NEGATIVE)
+    )
     used, corner = blocks.used, blocks.corner
     store_word, load_word, stack_argument = lanes.store_word, lanes.load_word, lanes.stack_argument
     numbers = stack_numbers(lanes, precision, ray_base)
@@ -202,20 +193,14 @@ def watertight_triangles(
     def candidates(units: wp.uint64, block: int, lane: int, stack: stack_argument):
         """The lanes whose triangle the ray's line hits, one bit each, and those that it passes clockwise."""
         u, v, w = edges(units, block, lane, stack)
-        low = wp.min(wp.min(u, v), w)
-        high = wp.max(wp.max(u, v), w)
-        hit_mask = wp.uint32(0)
-        for i in range(length):
-            hit_mask = with_bit_if_inside(hit_mask, wp.uint32(1 << i), low[i], high[i])
-        hit_mask = used(units, block, lane, hit_mask)
+        low = smaller(smaller(u, v), w)
+        high = larger(larger(u, v), w)
+        hit_mask = used(units, block, lane, same_sign(low, high, 0))
         negative = wp.uint32(0)
         if hit_mask != wp.uint32(0):
-            ties = wp.uint32(0)
-            for i in range(length):
-                negative = with_bit_if_negative(negative, wp.uint32(1 << i), low[i])
-                ties = with_bit_if_tied(ties, wp.uint32(1 << i), low[i], high[i])
+            negative = negative_in(low, high, 0)
             # An edge function of zero may hide a sign; it is computed again in double, which holds products.
-            ties = ties & hit_mask
+            ties = tied(low, high, 0) & hit_mask
             while ties != wp.uint32(0):
                 i = lowest_lane(ties)
                 bit = wp.uint32(1) << wp.uint32(i)

@@ -11,6 +11,7 @@ import warp as wp
 from wive.warp_kernels.lanes.lanes import product_double, without_gradient
 from wive.warp_kernels.lanes.native import EXACT_WEIGHT
 from wive.warp_kernels.lanes.precision import stack_numbers
+from wive.warp_kernels.lanes.vectors import make_larger, make_smaller
 from wive.warp_kernels.queries.frame import RayFrame64, axes_of, by_sheared_axis
 from wive.warp_kernels.triangles.sheared import edges_in_lanes, side_passed, sides_beside
 
@@ -57,6 +58,7 @@ def watertight_doubles(
 ) -> SimpleNamespace:
     """The test for a lane form and block form; its ray is kept from stack word `ray_base` on."""
     length: int = lanes.triangles_length
+    larger, smaller = make_larger(lanes.triangles), make_smaller(lanes.triangles)
     used, corner = blocks.used, blocks.corner
     store_word, load_word, stack_argument = lanes.store_word, lanes.load_word, lanes.stack_argument
     numbers = stack_numbers(lanes, precision, ray_base + AXIS_WORDS)
@@ -176,8 +178,8 @@ def watertight_doubles(
     def candidates(units: wp.uint64, block: int, lane: int, stack: stack_argument):
         """The lanes whose triangle the ray's line may hit, one bit each; the second word is not used."""
         u, v, w = edges(units, block, lane, stack)
-        low = wp.min(wp.min(u, v), w)
-        high = wp.max(wp.max(u, v), w)
+        low = smaller(smaller(u, v), w)
+        high = larger(larger(u, v), w)
         zero = wp.float64(0.0)
         hit_mask = wp.uint32(0)
         for i in range(length):
