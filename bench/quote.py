@@ -239,6 +239,17 @@ def stream_speed(content: report.Row) -> str:
     return markdown(["form", *(f"{kind}, {scene}" for kind in ("speed", "work") for scene in scenes)], lines)
 
 
+def latency_compare(content: report.Row) -> str:
+    """Speed of the Warp kernels over Warp's own query with its SAH tree: accuracies by kinds of rays."""
+    rows = where(content["compare"], builder="sah", lanes=8)
+    heads = [
+        (f"{accuracy}<br>{kind}", {"accuracy": accuracy, "rays": kind})
+        for accuracy in ACCURACIES
+        for (kind,) in distinct(rows, "rays")
+    ]
+    return pivot(rows, "ratio", heads)
+
+
 def peers_means(content: report.Row) -> str:
     """Speed over other libraries' trees: geometric mean over the scenes, and lowest."""
     ways = ("watertight", "fast", "one_ray")
@@ -286,6 +297,7 @@ TABLES: dict[str, Table] = {
         "spawn": "{spawn:.2f}", "points": "{points:.2f}", "normals": "{normals:.2f}",
         "error_bound": "{error_bound:.2f}", "spawn, of any hits": "{of_occluded:.2f}",
     }, texts=2),
+    "latency.compare": latency_compare,
     "stream.speed": stream_speed,
     "peers.means": peers_means,
     "peers.builds": listed("builds", {

@@ -6,7 +6,11 @@ from bench.figures import style
 from bench.support.report import Row
 
 BACKENDS = ("avx512", "avx2", "neon", "scalar")  # one of them is drawn, the first that there is
-NAMES = {"embreex": ("embreex", style.OTHER), "mesh_query_ray": ("Warp", "#8250df")}
+NAMES = {
+    "embreex": ("embreex", style.OTHER),
+    "mesh_query_ray sah": ("Warp", "#8250df"),
+}
+NOT_DRAWN = "mesh_query_ray cubql"  # lies near the other of Warp's trees
 NEARLY = 0.9  # of the highest speed
 
 
@@ -17,7 +21,7 @@ def draw(content: Row) -> Figure | None:
         return None
     found = dict.fromkeys(row["contender"] for row in curve)
     backend = next((name for name in BACKENDS if name in found), next(iter(found)))
-    drawn = [name for name in found if name == backend or name not in BACKENDS]
+    drawn = [name for name in found if name == backend or name not in (*BACKENDS, NOT_DRAWN)]
     ours = [row for row in curve if row["contender"] == backend]
     full = next(row["batch"] for row in ours if row["mrays"] >= NEARLY * max(r["mrays"] for r in ours))
     threads = content["threads"]
