@@ -19,6 +19,8 @@ MODULE_OPTIONS = {"fuse_fp": False, "enable_backward": False}
 # Registers per thread, by accuracy and lane form: more would leave room for fewer warps, fewer would make
 # kernels spill. Kernels of exact and of float64 trees, and those with counters, take what they need.
 MOST_REGISTERS = {("fast", 8): 80, ("fast", 1): 64, ("watertight", 8): 88, ("watertight", 1): 72}
+# The closest hit of watertight trees with float32 nodes, lanes=8: others would spill on sm_100.
+CLOSEST_REGISTERS = 80
 
 
 @functools.cache
@@ -48,6 +50,8 @@ def make_kernel(
 
     usual = precision == "float32" and not counters
     most_registers = MOST_REGISTERS.get((accuracy, length)) if usual else None
+    if usual and (query, accuracy, length, nodes) == ("closest", "watertight", 8, "float32"):
+        most_registers = CLOSEST_REGISTERS
     ray_kernel = wp.kernel(
         module="unique",
         enable_backward=False,

@@ -146,8 +146,9 @@ def make_settle(query: str, accuracy: str, length: int, counters: bool, precisio
     @wp.func
     def settle_closest(out: outputs_type, i: int, lane: int, unscale: real, walk: walk_type, ended: bool):
         own = wp.uint32(walk.found.prim)
-        if box_tmax(walk.found.t) != walk.tmax:
-            own = ALL_BITS
+        if wp.static(length == 1):
+            if box_tmax(walk.found.t) != walk.tmax:
+                own = ALL_BITS
         winner = min_reduce(own)
         if ended:
             if winner == ALL_BITS:

@@ -19,6 +19,7 @@ class Query:
     state: struct of what one thread has found.
     begin: the state of a ray for which nothing has been found.
     offer: the state after a hit, taken if it lies within the limits.
+    limit: the largest t of hits that are still taken; None if it is not in the frame's units.
     distance: t in the caller's units, for the closest hit.
     in_order: children are visited from front to back and stored with their distances, because tmax falls with
         every hit.
@@ -30,6 +31,7 @@ class Query:
     state: Any
     begin: wp.Function
     offer: wp.Function
+    limit: wp.Function | None = None
     distance: wp.Function | None = None
     in_order: bool = False
     first_hit_ends: bool = False
@@ -94,6 +96,14 @@ def make_queries(precision: str, best_type: Any, multi_hit_type: Any) -> dict[st
         return found
 
     @wp.func
+    def limit_of_best(best: best_type):
+        return best.t
+
+    @wp.func
+    def limit_of_all(found: multi_hit_type):
+        return found.tmax
+
+    @wp.func
     def distance(best: best_type, unscale: real):
         return best.t / unscale
 
@@ -130,12 +140,12 @@ def make_queries(precision: str, best_type: Any, multi_hit_type: Any) -> dict[st
         return found
 
     return {
-        "closest": Query(best_type, begin_best, offer_closest, distance, in_order=True),
-        "any": Query(best_type, begin_best, offer_any, first_hit_ends=True),
-        "count": Query(multi_hit_type, begin_multi_hit, offer_count, crossings=True),
-        "all": Query(multi_hit_type, begin_multi_hit, offer_all, crossings=True),
-        "count_touching": Query(multi_hit_type, begin_multi_hit, offer_count),
-        "all_touching": Query(multi_hit_type, begin_multi_hit, offer_all),
+        "closest": Query(best_type, begin_best, offer_closest, limit_of_best, distance, in_order=True),
+        "any": Query(best_type, begin_best, offer_any, limit_of_best, first_hit_ends=True),
+        "count": Query(multi_hit_type, begin_multi_hit, offer_count, limit_of_all, crossings=True),
+        "all": Query(multi_hit_type, begin_multi_hit, offer_all, limit_of_all, crossings=True),
+        "count_touching": Query(multi_hit_type, begin_multi_hit, offer_count, limit_of_all),
+        "all_touching": Query(multi_hit_type, begin_multi_hit, offer_all, limit_of_all),
     }
 
 

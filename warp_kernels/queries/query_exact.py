@@ -62,7 +62,12 @@ _FLOAT32 = QUERIES["float32"]
 # The closest hit has no `offer` here: triangle_exact.py compares distances, for which it needs the tree.
 EXACT_QUERIES = {
     "closest": replace(
-        _FLOAT32["closest"], state=ExactBest, begin=begin_exact, offer=None, distance=exact_distance
+        _FLOAT32["closest"],
+        state=ExactBest,
+        begin=begin_exact,
+        offer=None,
+        limit=None,
+        distance=exact_distance,
     ),
     "any": replace(_FLOAT32["any"], offer=offer_any),
     "count": replace(_FLOAT32["count"], offer=offer_count),

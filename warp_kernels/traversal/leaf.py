@@ -1,6 +1,7 @@
 """The test of a leaf: its blocks' triangles, once for both lane forms and every triangle test."""
 
 from types import SimpleNamespace
+from typing import Any
 
 import warp as wp
 
@@ -10,8 +11,14 @@ from wive.warp_kernels.queries.query import Query
 from wive.warp_kernels.traversal.states import LEAVES
 
 
-def make_offer(query: Query, lanes: SimpleNamespace, triangles: SimpleNamespace, real: type) -> wp.Function:
-    """The function that solves a triangle for t, u and v and offers them to the query."""
+def make_offer(
+    query: Query, lanes: SimpleNamespace, triangles: SimpleNamespace, real: type, keep_uv: Any
+) -> wp.Function:
+    """The function that solves a triangle for t, u and v and offers them to the query.
+
+    keep_uv: keeps u and v of a hit that is taken in the stack's memory; None if they are not needed there.
+    """
+    keeps_uv: bool = keep_uv is not None
     offer, solve, state_type = query.offer, triangles.solve, query.state
     keeps_place: bool = query.distance is not None
     stack_argument = lanes.stack_argument
@@ -28,10 +35,13 @@ def make_offer(query: Query, lanes: SimpleNamespace, triangles: SimpleNamespace,
         tmin: real,
         stack: stack_argument,
     ):
-        offered = offer(found, tmin, solve(units, block, j, stack, negative), prim)
+        hit = solve(units, block, j, stack, negative)
+        offered = offer(found, tmin, hit, prim)
         if wp.static(keeps_place):
             if offered.prim == prim:
                 offered.place = block + j
+                if wp.static(keeps_uv):
+                    keep_uv(stack, hit[1], hit[2])
         return offered
 
     return offer_triangle

@@ -34,6 +34,8 @@ from wive.warp_kernels.triangles.triangle_exact import make_exact_offer
 # What queries need of a ray, as numbers in the stack's memory.
 TMIN = 0
 UNSCALE = 1
+U = 2
+V = 3
 
 # The triangle test of each accuracy and precision, and the words that it keeps of a ray.
 TRIANGLES = {
@@ -72,11 +74,14 @@ def make_steps(
     in_order: bool = query_type.in_order
     first_hit_ends: bool = query_type.first_hit_ends
     make_triangles, ray_words = TRIANGLES[accuracy, precision]
+    # A thread alone keeps u and v of the closest hit in memory: they change rarely.
+    keeps_uv: bool = query == "closest" and length == 8 and accuracy != "exact"
     ray_base = stack_size * (2 if in_order else 1)
     # Both begin at even words: neighbours in a pair are stored and loaded together on CUDA.
     box_base = ray_base + ray_words + ray_words % 2
     own_base = box_base + BOX_WORDS + BOX_WORDS % 2
-    number_at = own_base + 2 * PRECISIONS[precision].words
+    own_numbers = 4 if keeps_uv else 2
+    number_at = own_base + own_numbers * PRECISIONS[precision].words
     lanes = lanes_of(length, number_at + 1, precision)
     entries = entries_of(lanes, in_order)
     blocks, node = block_form(lanes, nodes, precision), NODES[nodes](lanes)
@@ -84,10 +89,21 @@ def make_steps(
     frame_type = FRAMES[precision]
     keep_box = make_keep(lanes, node, box_base, frame_type)
     visit = make_visit(lanes, node, entries, box_base, in_order)
+    stack_argument = lanes.stack_argument
     numbers = stack_numbers(lanes, precision, own_base)
     store, load = numbers.store, numbers.load
     real = PRECISIONS[precision].real
-    offer = (make_exact_offer if accuracy == "exact" else make_offer)(query_type, lanes, triangles, real)
+
+    @without_gradient
+    @wp.func
+    def keep_uv(stack: stack_argument, u: real, v: real):
+        store(stack, U, u)
+        store(stack, V, v)
+
+    if accuracy == "exact":
+        offer = make_exact_offer(query_type, lanes, triangles, real)
+    else:
+        offer = make_offer(query_type, lanes, triangles, real, keep_uv if keeps_uv else None)
     test_leaf = make_leaf_test(query_type, lanes, blocks, triangles.candidates, offer, real)
     count_triangles = make_count(blocks)
     tree_type, found_type = HANDLES[accuracy, precision], query_type.state
@@ -97,8 +113,7 @@ def make_steps(
     keep_nearest: Any = None
     if compares:
         keep_nearest = triangles.keep_nearest if accuracy == "exact" else keep_nearest_double(lanes)
-    prepare = triangles.prepare
-    stack_argument, sync = lanes.stack_argument, lanes.sync
+    prepare, sync = triangles.prepare, lanes.sync
     store_word, load_word = lanes.store_word, lanes.load_word
     child_at, distance_at = entries.child, entries.distance
     group_vote, min_reduce = lanes.group_vote, lanes.min_reduce
@@ -133,6 +148,16 @@ def make_steps(
     @wp.func
     def number_kept(stack: stack_argument):
         return wp.int32(load_word(stack, number_at))
+
+    one_limit: bool = length == 8 and precision == "float32" and query_type.limit is not None
+    limit_of = query_type.limit
+
+    @wp.func
+    def limit(walk: walk_type):
+        """tmax for boxes: of a thread alone that of its query, if it is a float32 number of the frame."""
+        if wp.static(one_limit):
+            return limit_of(walk.found)
+        return walk.tmax
 
     @wp.func
     def goes_on(child: int, to_leaf: bool):
@@ -202,13 +227,13 @@ def make_steps(
                 if own.goes > 0 and hit != wp.uint32(0):
                     walk.top = 1  # the child below ends the traversal
         else:
-            own.count = visit(units, begin, lane, walk.tmax, stack, walk.top, own.goes > 0)
+            own.count = visit(units, begin, lane, limit(walk), stack, walk.top, own.goes > 0)
             sync()
             if wp.static(counters):
                 if own.goes > 0:
                     walk.inner_nodes += 1
         if own.goes > 0:
-            walk.top = nearest_left(stack, walk.top + own.count - 1, own.count, walk.tmax)
+            walk.top = nearest_left(stack, walk.top + own.count - 1, own.count, limit(walk))
             walk.child = child_at(stack, walk.top)
         sync()
         return walk
@@ -221,6 +246,9 @@ def make_steps(
             walk.found = keep_nearest(units, stack, lane, walk.found)
             own = wp.where(walk.found.prim == NO_PRIM, wp.inf, box_tmax(walk.found.t))
             walk.tmax = unsortable(min_reduce(sortable(own)))
+        if wp.static(keeps_uv):
+            walk.found.u = load(stack, U)
+            walk.found.v = load(stack, V)
         return walk
 
     @without_gradient
