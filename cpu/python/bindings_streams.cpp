@@ -1,6 +1,6 @@
 // The Python module: rays and checksums of streams.
-#include <algorithm>
 #include <cstdint>
+#include <cstring>
 #include <span>
 
 #include "core/crc32.h"
@@ -20,8 +20,9 @@ void split_rays(const Array<Real>& table, Array<Real>& origins, Array<Real>& dir
     Real *origin = origins.mutable_data(), *direction = directions.mutable_data();
     const py::gil_scoped_release released;
     for (py::ssize_t i = 0; i < count; ++i, row += columns, origin += 3, direction += 3) {
-        std::copy_n(row, 3, origin);
-        std::copy_n(row + 3, 3, direction);
+        // Not std::copy_n, for which GCC calls memmove: that takes three times as long.
+        std::memcpy(origin, row, sizeof(Real[3]));
+        std::memcpy(direction, row + 3, sizeof(Real[3]));
     }
 }
 
