@@ -22,9 +22,11 @@ std::uint64_t checksum_of_chunk(std::span<const std::byte> data) {
     std::uint64_t states[lanes];
     for (std::size_t lane = 0; lane < lanes; ++lane) states[lane] = (lane + 1) * factor;
     const auto add_stripe = [&](const std::byte* stripe) {
-        std::uint64_t words[lanes];
-        std::memcpy(words, stripe, stripe_bytes);
-        for (std::size_t lane = 0; lane < lanes; ++lane) states[lane] = mixed(states[lane], words[lane]);
+        for (std::size_t lane = 0; lane < lanes; ++lane) {
+            std::uint64_t word;  // one by one: GCC would copy a whole stripe to memory and back
+            std::memcpy(&word, stripe + sizeof(word) * lane, sizeof(word));
+            states[lane] = mixed(states[lane], word);
+        }
     };
     std::size_t at = 0;
     for (; at + stripe_bytes <= data.size(); at += stripe_bytes) add_stripe(data.data() + at);

@@ -34,14 +34,16 @@ std::uint32_t kept_registers() {
 }
 
 struct Processor {
-    bool avx2 = false, avx512 = false, clmul = false;
+    bool avx2 = false, avx512 = false, clmul = false, wide_clmul = false;
 
     Processor() {
         // Intel's Software Developer's Manual, volume 2, CPUID, and AMD's volume 3, appendix E.
         constexpr int clmul_bit = 1, fma = 12, popcnt = 23, osxsave = 27, lzcnt = 5;        // words c
         constexpr int bmi1 = 3, avx2_bit = 5, bmi2 = 8, f = 16, dq = 17, bw = 30, vl = 31;  // word b of leaf 7
+        constexpr int vpclmul = 10;                                                         // word c of leaf 7
         constexpr int xmm = 1, ymm = 2;                                                     // XCR0
-        const std::uint32_t basic = cpuid(1).c, more = cpuid(7).b, extended = cpuid(0x80000001u).c;
+        const std::uint32_t basic = cpuid(1).c, extended = cpuid(0x80000001u).c;
+        const auto [a, more, even_more, d] = cpuid(7);
         clmul = has_all(basic, clmul_bit);
         if (!has_all(basic, osxsave)) return;
         const std::uint32_t kept = kept_registers();
@@ -54,11 +56,12 @@ struct Processor {
         const bool keeps_zmm = has_all(kept, masks, zmm_low, zmm_high);
 #endif
         avx512 = avx2 && has_all(more, f, dq, bw, vl) && keeps_zmm;
+        wide_clmul = avx512 && has_all(even_more, vpclmul);
     }
 };
 #else
 struct Processor {
-    bool avx2 = false, avx512 = false, clmul = false;
+    bool avx2 = false, avx512 = false, clmul = false, wide_clmul = false;
 };
 #endif
 
@@ -73,5 +76,6 @@ const Processor& processor() {
 bool has_avx2() { return processor().avx2; }
 bool has_avx512() { return processor().avx512; }
 bool has_clmul() { return processor().clmul; }
+bool has_wide_clmul() { return processor().wide_clmul; }
 
 }  // namespace wive

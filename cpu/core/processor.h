@@ -9,5 +9,7 @@ bool has_avx2();
 bool has_avx512();
 // Carry-less multiplication of SSE registers.
 bool has_clmul();
+// And of those of AVX-512, with all that has_avx512() asks for.
+bool has_wide_clmul();
 
 }  // namespace wive
