@@ -13,7 +13,7 @@ from numpy.typing import DTypeLike
 from wive import _cpu
 from wive._internal import arguments
 from wive._internal.files import PathLike, check_output, file_name, named_error
-from wive._internal.flusher import one_thread
+from wive._internal.flusher import HelperThread
 from wive._internal.hit_columns import Column
 from wive._internal.hit_files import HitFile
 from wive._internal.hit_records import RECORD_FORM
@@ -135,9 +135,9 @@ def trace(
     check_hits_output(output, inputs)
     with open_rays(rays, format_) as reader:
         file = _hit_file(scene, reader, output, query, how)
-        read = file.begin(resume)
-        resumed = file.done
         try:
+            read = file.begin(resume)
+            resumed = file.done
             with progress_of(progress, reader.count, "ray", "tracing") as asked:
                 _verify(file, reader, size, file.read if read is None else read)
                 if read is not None:
@@ -218,7 +218,7 @@ def _traced(
         rays = reader.read(min(piece, reader.count - begin), checksummed)
         return rays, reader.checksum if checksummed else []
 
-    with one_thread() as helper:
+    with HelperThread() as helper:
         coming = helper.submit(read, starts[0]) if starts else None
         for i, begin in enumerate(starts):
             assert coming is not None
@@ -240,7 +240,7 @@ def _write_all(
     """Trace the rays that are left; a piece is written while the next one is traced."""
     names = ("t", "prim", "uv", "offsets")
     written = None
-    with one_thread() as helper:
+    with HelperThread() as helper:
         for begin, hits, checksum in _traced(ask, reader, file.done, piece, True, progress):
             arrays = {name: getattr(hits, name) for name in names if hasattr(hits, name)}
             if written is not None:

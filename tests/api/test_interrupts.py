@@ -1,6 +1,7 @@
 """Ctrl-C and other signals are handled while the core works, and everything can be used afterwards."""
 
 import signal
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import partial
@@ -10,6 +11,7 @@ import pytest
 from support.meshes import soup
 
 import wive
+from wive._internal.flusher import HelperThread
 
 if not hasattr(signal, "setitimer"):
     pytest.skip("the system has no interval timers", allow_module_level=True)
@@ -89,3 +91,23 @@ def test_what_a_handler_raises_ends_the_call(
     with pytest.raises(Interrupted), every(0.05, stop):
         calls[name]()
     assert scene.intersect(*down).prim == before
+
+
+def test_files_stay_open_until_their_thread_has_ended() -> None:
+    """However often Ctrl-C is pressed: a closed file's number may be another file's."""
+    done: list[int] = []
+
+    def work() -> None:
+        time.sleep(0.3)
+        done.append(1)
+
+    def stop() -> None:
+        raise Interrupted
+
+    with pytest.raises(Interrupted), every(0.05, stop):
+        try:
+            with HelperThread() as helper:
+                helper.submit(work)
+        finally:
+            signal.setitimer(signal.ITIMER_REAL, 0)
+            assert done

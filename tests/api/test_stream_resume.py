@@ -48,6 +48,13 @@ def interrupt(folder, output="hits.npz", query="intersect", *, after=450, error=
     return raised.value
 
 
+def content_of_run(folder, query):
+    """The bytes of an output of a run without interruption."""
+    folder.mkdir()
+    trace(folder, query=query)
+    return content_of(folder / "hits.npz")
+
+
 @pytest.mark.parametrize("output", OUTPUTS)
 @pytest.mark.parametrize("query", QUERIES)
 def test_the_output_has_the_arrays_of_the_scene_s_hits(tmp_path, output, query):
@@ -215,6 +222,81 @@ def test_a_killed_run_that_was_not_written_down_begins_again(tmp_path):
     (tmp_path / "hits.npz.part" / "content" / "npz").write_bytes(b"half")
     trace(tmp_path)
     assert content_of(tmp_path / "hits.npz") == content_of(whole)
+
+
+@pytest.mark.parametrize("output", OUTPUTS)
+@pytest.mark.parametrize("goes_on", [False, True])
+def test_ctrl_c_while_a_run_begins_leaves_all_as_it_was(tmp_path, monkeypatch, output, goes_on):
+    if goes_on:
+        interrupt(tmp_path, output)
+    before = {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*") if path.name != "rays.npy"}
+
+    def open_files(self, folder):
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patched, pytest.raises(KeyboardInterrupt):
+        patched.setattr(hit_columns.HitColumns, "open", open_files)
+        trace(tmp_path, output, resume=True)
+    after = {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*") if path.name != "rays.npy"}
+    assert after == before
+    assert trace(tmp_path, output, resume=True).resumed == (500 if goes_on else 0)
+
+
+def ended_in_place(monkeypatch, error):
+    """Runs end by the error as soon as their output is in place."""
+
+    def remove(self):
+        raise error
+
+    monkeypatch.setattr(hit_files.HitFile, "_remove", remove)
+
+
+@pytest.mark.parametrize("query", QUERIES)
+def test_a_run_that_is_killed_when_its_output_is_in_place_was_complete(tmp_path, monkeypatch, query):
+    monkeypatch.setattr(hit_files, "CHECKPOINT", 0)
+    expected = content_of_run(tmp_path / "other", query)
+    with monkeypatch.context() as patched, pytest.raises(Stop):
+        ended_in_place(patched, Stop)
+        patched.setattr(hit_files.HitFile, "end", lambda self, error: self.close() or "")  # no time for that
+        trace(tmp_path, query=query)
+    assert (tmp_path / "hits.npz.part" / "state.json").exists()
+    assert trace(tmp_path, query=query, resume=True).resumed == COUNT
+    assert content_of(tmp_path / "hits.npz") == expected
+    assert not (tmp_path / "hits.npz.part").exists()
+
+
+def test_a_record_is_never_taken_for_one_of_another_run(tmp_path, monkeypatch):
+    """One run was killed when its output was in place, the next one before it had a record."""
+    monkeypatch.setattr(hit_files, "CHECKPOINT", 0)
+    with monkeypatch.context() as patched, pytest.raises(Stop):
+        ended_in_place(patched, Stop)
+        patched.setattr(hit_files.HitFile, "end", lambda self, error: self.close() or "")
+        trace(tmp_path)
+    expected = content_of(tmp_path / "hits.npz")
+    (tmp_path / "hits.npz").unlink()
+    monkeypatch.setattr(hit_files, "CHECKPOINT", 1e9)
+    with monkeypatch.context() as patched:
+        patched.setattr(hit_files.HitFile, "end", lambda self, error: self.close() or "")
+        interrupt(tmp_path)
+    assert trace(tmp_path, resume=True).resumed == 0
+    assert content_of(tmp_path / "hits.npz") == expected
+
+
+@pytest.mark.parametrize("output", OUTPUTS)
+def test_ctrl_c_when_the_output_is_in_place_leaves_it_whole(tmp_path, monkeypatch, output):
+    replace, calls = os.replace, []
+
+    def interrupted(*names):
+        replace(*names)
+        if not calls and "content" in str(names[0]):
+            calls.append(names)
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(os, "replace", interrupted)
+    with pytest.raises(KeyboardInterrupt, match=r"^$"):
+        trace(tmp_path, output)
+    assert sorted(path.name for path in tmp_path.iterdir()) == [output.rstrip("/"), "rays.npy"]
+    assert trace(tmp_path, output, resume=True).resumed == COUNT
 
 
 def test_folders_of_others_are_left_alone(tmp_path):

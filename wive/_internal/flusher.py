@@ -4,12 +4,38 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterable
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor, wait
+from types import TracebackType
 
 
-def one_thread() -> ThreadPoolExecutor:
-    """A helper thread, joined at the end of a block."""
-    return ThreadPoolExecutor(1, thread_name_prefix="wive-stream")
+class HelperThread(ThreadPoolExecutor):
+    """A thread that does one thing after the other, and has done all at the end of a block."""
+
+    def __init__(self) -> None:
+        """The thread is made when it is needed."""
+        super().__init__(1, thread_name_prefix="wive-stream")
+        self._ended = False
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Wait for it."""
+        self.end()
+
+    def end(self) -> None:
+        """Wait for it, also if Ctrl-C comes meanwhile: the files that it uses are closed next."""
+        if self._ended:
+            return
+        self._ended, interrupt = True, None
+        last = self.submit(int)  # Python's threads can't be waited for any more once a wait was interrupted
+        while not last.done():
+            try:
+                wait([last])
+            except BaseException as error:
+                interrupt = error
+        self.shutdown()
+        if interrupt is not None:
+            raise interrupt
 
 
 class Flusher:
@@ -20,7 +46,7 @@ class Flusher:
 
     def __init__(self) -> None:
         """The thread is made when it is needed."""
-        self._thread = one_thread()
+        self._thread = HelperThread()
         self._flush: Future[None] | None = None
 
     @property
@@ -40,7 +66,7 @@ class Flusher:
 
     def close(self) -> None:
         """End the thread when its flush is done."""
-        self._thread.shutdown()
+        self._thread.end()
 
 
 def _flushed(files: set[int], then: Callable[[], object] | None) -> None:

@@ -15,6 +15,7 @@ from wive import _cpu
 from wive._internal.npz_layout import NPY_HEAD, NpzLayout, Stored, joined_crc, npy_head
 
 COPIED = 1 << 18
+NPZ = "npz"  # the npz file in the making
 
 
 class Column(NamedTuple):
@@ -74,7 +75,7 @@ class HitColumns:
             in_place = [array for array in arrays if array.name not in self._beside]
             self._begins |= {array.name: layout.begins[array.name] + NPY_HEAD for array in in_place}
             end = self._begins[in_place[-1].name] - NPY_HEAD + in_place[-1].size
-            shared = _opened(os.path.join(folder, "npz"), end)
+            shared = _opened(os.path.join(folder, NPZ), end)
             self._files = {array.name: shared for array in in_place}
         for array in arrays:
             if array.name not in self._files:
@@ -126,9 +127,9 @@ class HitColumns:
 
     def close(self) -> None:
         """Close the files."""
-        for file in self.files:
+        files, self._files = self.files, {}
+        for file in files:
             os.close(file)
-        self._files = {}
 
     def _copy(self, name: str, made: int, place: int, left: int, copied: Callable[[int], None]) -> None:
         """Copy an array that grew beside the npz file to its place there."""

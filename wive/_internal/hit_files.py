@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from wive._internal.files import PathLike, file_name, named_error, put_in_place
 from wive._internal.flusher import Flusher
-from wive._internal.hit_columns import Column, HitColumns
+from wive._internal.hit_columns import NPZ, Column, HitColumns
 from wive._internal.hit_records import RECORD, STATE, expect_common, record_of, state_of, write_state
 from wive._internal.lines import one_line
 
@@ -43,7 +43,7 @@ class HitFile:
         self._content = os.path.join(self.part, CONTENT)
         self._about, self._count, self._ragged = about, int(about["rays"]), ragged
         self._columns = HitColumns(columns, self._count, ragged=ragged, is_folder=self.is_folder)
-        self._lock, self._goes_on = -1, False
+        self._lock, self._begun, self._goes_on = -1, False, False
         self._flusher, self._unflushed, self._kept = Flusher(), 0, time.monotonic()
         self.done = self.hits = 0
         self._rows = 0
@@ -51,11 +51,14 @@ class HitFile:
 
     def begin(self, resume: bool) -> list[str] | None:
         """Make or find the folder; the checksums of the `done` rays, None if all is complete and in place."""
-        if resume and not os.path.exists(self.part) and os.path.exists(self._final):
+        if resume and os.path.exists(self._final) and not self._has_content():
             record = record_of(self._final, self.is_folder)
             if record is not None:
                 expect_common(record["about"], self._about, f"output {self.name!r} is complete, but")
                 self.done, self.hits, self.read = self._count, record["hits"], record["read"]
+                if os.path.exists(self.part):  # of a run that was killed when it had put the output in place
+                    self._lock_part()
+                    self._remove()
                 return None
         if self.is_folder and os.path.exists(self._final) and not is_empty_folder(self._final):
             raise FileExistsError(f"output folder {self.name!r} exists: choose another name, or delete it")
@@ -63,8 +66,8 @@ class HitFile:
         try:
             self._columns.open(self._content)
         except OSError as error:
-            self.end(error)
             raise named_error(error, self.name) from error
+        self._begun = True
         return self.read
 
     def write(self, arrays: dict[str, NDArray[Any]], rays: int, read: list[str]) -> None:
@@ -98,7 +101,7 @@ class HitFile:
         else:
             self._columns.end_npz(self._rows, text, self._flush_in_time)
             self._flusher.wait()
-            made = os.path.join(self._content, "npz")
+            made = os.path.join(self._content, NPZ)
             with open(made, "r+b") as file:
                 put_in_place(file, made, self._final)
         self._remove()
@@ -107,7 +110,12 @@ class HitFile:
         """Keep what is done, if a run can go on after this error; where that is, or "" if it is not kept."""
         if self._lock < 0:
             return ""
+        if not self._begun:
+            if state_of(self.part) is None:
+                self._remove()
+            return ""
         keep = self.done > 0 and (self._goes_on or not isinstance(error, TypeError | ValueError))
+        keep = keep and self._has_content()
         if keep:
             try:
                 self._keep()
@@ -120,36 +128,50 @@ class HitFile:
         shown = one_line(self.part)
         return f"{self.done:,} of {self._count:,} rays are kept in {shown}: resume to go on, or delete it"
 
-    def _take_part(self, resume: bool) -> None:
-        """Make the folder, or go on with one that is there."""
+    def _has_content(self) -> bool:
+        """Whether there is something of an output that is not yet in place."""
+        return os.path.exists(self._content if self.is_folder else os.path.join(self._content, NPZ))
+
+    def _lock_part(self) -> None:
+        """Make the folder, and keep other runs away; OSError if there is one."""
         if sys.platform == "win32":
             raise OSError(f"{self.name}: can't be written piece by piece on Windows: use wive.stream")
         import fcntl
 
         try:
             os.makedirs(self.part, 0o700, exist_ok=True)  # as private as a file that is replaced may be
-            self._lock = os.open(self.part, os.O_RDONLY)
-            fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            lock = os.open(self.part, os.O_RDONLY)
+            try:
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                self._lock = lock
+            except BaseException:
+                self._lock = -1
+                os.close(lock)
+                raise
         except BlockingIOError:
-            self.close()
             raise OSError(f"{one_line(self.part)}: another run is writing there: wait for its end") from None
         except OSError as error:
             raise named_error(error, self.part) from error
-        if not {STATE, CONTENT}.issuperset(os.listdir(self.part)):
-            self.close()
-            raise FileExistsError(f"folder {self.part!r} is in the way: choose another output, or move it")
-        state = state_of(self.part)
-        if state is None or not os.path.isdir(self._content):
-            shutil.rmtree(self._content, ignore_errors=True)
-            return
+
+    def _take_part(self, resume: bool) -> None:
+        """Make the folder, or go on with one that is there."""
+        self._lock_part()
         try:
+            if not {STATE, CONTENT}.issuperset(os.listdir(self.part)):
+                raise FileExistsError(
+                    f"folder {self.part!r} is in the way: choose another output, or move it"
+                )
+            state = state_of(self.part)
+            if state is None or not self._has_content():
+                self._clear()
+                return
             if not resume:
                 raise FileExistsError(
                     f"{one_line(self.part)}: holds {state['done']:,} rays of an interrupted run: "
                     "resume it, or delete the folder"
                 )
             expect_common(state["about"], self._about, f"{one_line(self.part)}: the interrupted run")
-        except BaseException:
+        except (OSError, ValueError):
             self.close()
             raise
         self._goes_on = True
@@ -192,17 +214,22 @@ class HitFile:
         """Let go of the folder, as it is."""
         self._flusher.close()
         self._columns.close()
-        if self._lock >= 0:
-            os.close(self._lock)
-        self._lock = -1
+        lock, self._lock = self._lock, -1
+        if lock >= 0:
+            os.close(lock)
 
     def _remove(self) -> None:
         """Remove the folder."""
         self._flusher.close()  # it may be about to write a record
-        with suppress(OSError):
-            os.unlink(os.path.join(self.part, STATE))
+        self._clear()
         shutil.rmtree(self.part, ignore_errors=True)
         self.close()
+
+    def _clear(self) -> None:
+        """Remove what is in the folder, the record first: it must not be of other content."""
+        with suppress(OSError):
+            os.unlink(os.path.join(self.part, STATE))
+        shutil.rmtree(self._content, ignore_errors=True)
 
 
 def is_empty_folder(path: str) -> bool:
