@@ -62,6 +62,32 @@ def checksum(data: NDArray[np.uint8], threads: int = 0) -> int:
 def crc32(data: NDArray[np.uint8], before: int = 0) -> int:
     """The CRC-32 of zip archives of the bytes (n,) behind others whose CRC is `before`."""
 
+class RunningChecksum:
+    """A checksum of bytes that doesn't depend on the pieces they are added in, but on the size of a block."""
+
+    def __init__(self, block: int) -> None: ...
+    def add(self, data: NDArray[np.uint8]) -> None:
+        """Add the bytes (n,). The interpreter lock is released."""
+
+    @property
+    def both(self) -> tuple[int, int]:
+        """64 bits of the whole blocks, and of what is behind them."""
+
+def read_rays(
+    file: int,
+    place: int,
+    origins: NDArray[Real],
+    directions: NDArray[Real],
+    tmin: NDArray[Real] | None,
+    tmax: NDArray[Real] | None,
+    checksum: RunningChecksum | None,
+) -> int:
+    """Read rows of six numbers, or of eight if there are tmin and tmax, of an open file from byte `place` on.
+
+    The arrays (n,3) and (n,) are filled, and the rows' bytes added to the checksum. Returns how many bytes
+    the file had. The interpreter lock is released. Not on Windows.
+    """
+
 def split_rays(table: NDArray[Real], origins: NDArray[Real], directions: NDArray[Real]) -> None:
     """Write columns 0 to 2 and 3 to 5 of the table (n,k) to two arrays (n,3)."""
 

@@ -48,7 +48,7 @@ def test_every_query_streams(tmp_path, query):
 
 
 def test_all_cores_trace_while_the_next_rays_are_summed_up(tmp_path, monkeypatch):
-    name, _ = write_rays("npy", tmp_path, some_rays())
+    name, _ = write_rays("npz", tmp_path, some_rays())
     scene, cores, used = small_scene(), _cpu.thread_count(), []
     long = np.zeros(1 << 26, np.uint8)
     query = wive.Scene.intersect

@@ -76,6 +76,24 @@ class FileRows:
                 streams[-1].read(1)  # zipfile compares the checksum at the end
         return rows.astype(self.dtype.newbyteorder("="), copy=False)
 
+    def read_by(self, count: int, read: Callable[[int, int], int]) -> bool:
+        """Leave the next rows to `read`: it takes an open file and a place, returns how many bytes it got.
+
+        False, and nothing is read, unless rows lie together in a file of a system that reads at places.
+        """
+        with self._refused():
+            streams = self._streams or self._open()
+            file = streams[0]
+            if len(streams) > 1 or not isinstance(file, io.FileIO) or not hasattr(os, "pread"):
+                return False
+            wanted = count * self.dtype.itemsize * math.prod(self.shape[1:])
+            found = read(file.fileno(), file.tell())
+            if found != wanted:
+                raise ValueError(f"cut off {wanted - found} bytes before its end")
+            file.seek(wanted, os.SEEK_CUR)
+        self._left -= count
+        return True
+
     def skip(self, count: int) -> None:
         """Leave the next rows out."""
         with self._refused():

@@ -15,7 +15,7 @@ from wive._internal.arguments import nan_if_masked
 from wive._internal.arguments import rays as checked_rays
 from wive._internal.files import PathLike
 from wive._internal.lines import one_line
-from wive._internal.npy_rows import ArrayRows, Header, Rows
+from wive._internal.npy_rows import ArrayRows, FileRows, Header, Rows
 from wive._internal.npzfile import Npz, check_input, file_rows, open_npy_or_npz
 from wive._internal.precision import FLOAT64
 
@@ -23,7 +23,7 @@ EXPECTED = "a file of rays, (n,6) or (n,8) in an .npy or `origins` and `directio
 NAMES = ("ox", "oy", "oz", "dx", "dy", "dz", "tmin", "tmax")
 SKIPPED = "_"
 # Bytes of rays under one checksum: whole rows of 6 or 8 numbers of 4 or 8 bytes, few enough to stay in a
-# cache while they are read, summed up and split into origins and directions.
+# cache while they are read, summed up and split into origins and directions. Also in bindings_streams.cpp.
 BLOCK = 3 << 17
 
 Array = NDArray[Any]
@@ -98,32 +98,17 @@ class RunningChecksum:
 
     def __init__(self) -> None:
         """Of nothing."""
-        self._blocks = 0
-        self._last, self._used = np.zeros(BLOCK, np.uint8), 0
+        self.core = _cpu.RunningChecksum(BLOCK)
 
     def add(self, array: Array) -> None:
         """Add the array's bytes."""
-        data = np.ascontiguousarray(array).reshape(-1).view(np.uint8)
-        while len(data):
-            taken = data[: BLOCK - self._used]
-            if len(taken) == BLOCK:
-                self._end(taken)
-            else:
-                self._last[self._used : self._used + len(taken)] = taken
-                self._used += len(taken)
-                if self._used == BLOCK:
-                    self._end(self._last)
-                    self._used = 0
-            data = data[len(taken) :]
+        self.core.add(np.ascontiguousarray(array).reshape(-1).view(np.uint8))
 
     @property
     def text(self) -> str:
         """The checksum."""
-        return f"{self._blocks:016x}{_cpu.checksum(self._last[: self._used], 1):016x}"
-
-    def _end(self, block: NDArray[np.uint8]) -> None:
-        both = np.array([self._blocks, _cpu.checksum(block, 1)], np.uint64)
-        self._blocks = _cpu.checksum(both.view(np.uint8), 1)
+        blocks, rest = self.core.both
+        return f"{blocks:016x}{rest:016x}"
 
 
 @contextmanager
@@ -215,10 +200,17 @@ def _of_table(rows: Rows, names: Sequence[str]) -> RayReader:
     dtype = rows.dtype.newbyteorder("=")
     step = max(1, BLOCK // (rows.dtype.itemsize * len(names)))
     is_usual = tuple(names[:6]) == NAMES[:6] and dtype in (np.float32, np.float64)
+    is_plain = is_usual and tuple(names) in (NAMES[:6], NAMES) and rows.dtype == dtype
 
     def taken(count: int, checksums: list[RunningChecksum]) -> Rays:
         split = [np.empty((count, 3), dtype) for _ in vectors]
         limits = [np.empty(count, dtype) if name in places else None for name in NAMES[6:]]
+        low, high = (usual if limit is None else limit for limit, usual in zip(limits, LIMITS, strict=True))
+        if is_plain and isinstance(rows, FileRows):
+            core = checksums[0].core if checksums else None
+            arrays = split[0], split[1], limits[0], limits[1]
+            if rows.read_by(count, lambda file, place: _cpu.read_rays(file, place, *arrays, core)):
+                return split[0], split[1], low, high
         for begin in range(0, count, step):
             table = rows.read(min(step, count - begin))
             for checksum in checksums:
@@ -233,7 +225,6 @@ def _of_table(rows: Rows, names: Sequence[str]) -> RayReader:
             for limit, name in zip(limits, NAMES[6:], strict=True):
                 if limit is not None:
                     limit[place] = table[:, places[name]]
-        low, high = (usual if limit is None else limit for limit, usual in zip(limits, LIMITS, strict=True))
         return split[0], split[1], low, high
 
     checked_rays(*taken(0, []), FLOAT64)
