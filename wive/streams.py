@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -13,7 +14,7 @@ from numpy.typing import DTypeLike
 from wive import _cpu
 from wive._internal import arguments
 from wive._internal.files import PathLike, check_output, file_name, named_error
-from wive._internal.flusher import HelperThread
+from wive._internal.helper_thread import HelperThread
 from wive._internal.hit_columns import Column
 from wive._internal.hit_files import HitFile
 from wive._internal.hit_records import RECORD_FORM
@@ -219,13 +220,13 @@ def _traced(
         return rays, reader.checksum if checksummed else []
 
     with HelperThread() as helper:
-        coming = helper.submit(read, starts[0]) if starts else None
+        coming = helper.submit(partial(read, starts[0])) if starts else None
         for i, begin in enumerate(starts):
             assert coming is not None
             rays, checksum = coming.result()
             query = ask()  # while no rays are read
             if i + 1 < len(starts):
-                coming = helper.submit(read, starts[i + 1])
+                coming = helper.submit(partial(read, starts[i + 1]))
             answer = query(*rays)
             del rays
             yield begin, answer, checksum
@@ -245,7 +246,8 @@ def _write_all(
             arrays = {name: getattr(hits, name) for name in names if hasattr(hits, name)}
             if written is not None:
                 written.result()
-            written = helper.submit(file.write, arrays, min(piece, reader.count - begin), checksum)
+            rays = min(piece, reader.count - begin)
+            written = helper.submit(partial(file.write, arrays, rays, checksum))
             del arrays, hits
         if written is not None:
             written.result()

@@ -11,7 +11,7 @@ import pytest
 from support.meshes import soup
 
 import wive
-from wive._internal.flusher import HelperThread
+from wive._internal.helper_thread import HelperThread
 
 if not hasattr(signal, "setitimer"):
     pytest.skip("the system has no interval timers", allow_module_level=True)
@@ -111,3 +111,16 @@ def test_files_stay_open_until_their_thread_has_ended() -> None:
         finally:
             signal.setitimer(signal.ITIMER_REAL, 0)
             assert done
+
+
+def test_what_a_helper_raises_reaches_who_asks_and_the_next_task_runs() -> None:
+    def fail() -> None:
+        raise Interrupted
+
+    with HelperThread() as helper:
+        tasks = helper.submit(fail), helper.submit(lambda: 3)
+        for _ in range(2):
+            with pytest.raises(Interrupted):
+                tasks[0].result()
+            assert tasks[1].result() == 3
+    helper.end()  # nothing is left to wait for
