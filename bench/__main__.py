@@ -15,6 +15,7 @@ BENCHES = {
     "gpu": "wive's Warp kernels on a GPU: the core's bits, speed against Warp's own query, streams",
     "gpu_model": "what a GPU's warps would do in wive's kernels and Warp's query, without one",
     "inflight": "speed and latency over the rays in flight, and what memory's latency allows",
+    "interrupts": "milliseconds until Ctrl-C has ended a call or a command",
     "latency": "seconds per call over batch sizes: every backend, wp.mesh_query_ray, embreex",
     "moving": "one mesh that moves in a scene: refit(geom=), refit, a new scene, a second scene",
     "order": "steps per ray for five orders of visiting a node's children, and their speed",

@@ -9,6 +9,7 @@ import json
 import re
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
+from statistics import median
 
 from bench.support import report
 from bench.support.groups import distinct, grouped
@@ -250,6 +251,16 @@ def latency_compare(content: report.Row) -> str:
     return pivot(rows, "ratio", heads)
 
 
+def interrupts_kinds(content: report.Row) -> str:
+    """Tries of each kind of call or command, and the median of the scenes' medians and the longest, in ms."""
+    lines = []
+    for key, rows in grouped(content["rows"], ("where", "kind")):
+        middle = median(row["median"] for row in rows)
+        longest = max(row["longest"] for row in rows)
+        lines.append([*key.values(), sum(row["tries"] for row in rows), f"{middle:.0f}", f"{longest:.0f}"])
+    return markdown(["where", "kind", "tries", "median, ms", "longest, ms"], lines, texts=2)
+
+
 def peers_means(content: report.Row) -> str:
     """Speed over other libraries' trees: geometric mean over the scenes, and lowest."""
     ways = ("watertight", "fast", "one_ray")
@@ -299,6 +310,11 @@ TABLES: dict[str, Table] = {
     }, texts=2),
     "latency.compare": latency_compare,
     "stream.speed": stream_speed,
+    "interrupts.kinds": interrupts_kinds,
+    "interrupts.total": listed("total", {
+        "where": "{where}", "tries": "{tries}", "median, ms": "{median:.0f}", "99 %, ms": "{p99:.0f}",
+        "longest, ms": "{longest:.0f}",
+    }),
     "peers.means": peers_means,
     "peers.builds": listed("builds", {
         "scene": "{scene}", "triangles": "{triangles:,}", "peer": "{peer}", "usual / medium": "{usual:.2f}",

@@ -9,8 +9,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 DRAWN = (
-    "build", "cliffs", "closest", "dask", "embree", "inflight", "latency", "moving", "order", "packets",
-    "paper", "pareto", "peers", "python", "spawn", "stream",
+    "build", "cliffs", "closest", "dask", "embree", "inflight", "interrupts", "latency", "moving", "order",
+    "packets", "paper", "pareto", "peers", "python", "spawn", "stream",
 )  # fmt: skip
 
 

@@ -3,6 +3,7 @@
 import json
 import os
 import re
+import signal
 import subprocess
 import sys
 from collections.abc import Callable
@@ -100,6 +101,14 @@ def test_bench_stream_compares_every_form_of_files(bench: Callable[..., dict[str
     content = bench("stream", "--scenes", SCENE)
     assert len({row["form"] for row in content["rows"]}) == 7
     assert all(row["ratio"] > 0 for row in content["rows"])
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGCONT"), reason="the system has no such signals")
+def test_bench_interrupts_ends_calls_and_commands(bench: Callable[..., dict[str, Any]]) -> None:
+    content = bench("interrupts", "--scenes", SCENE)
+    assert {row["kind"] for row in content["rows"]} >= {"Scene", "trace", "wive trace", "wive render"}
+    assert all(row["tries"] == 1 and row["longest"] > 0 for row in content["rows"])
+    assert [row["where"] for row in content["total"]] == ["Python", "command line"]
 
 
 def test_bench_paper_renders_embrees_picture(bench: Callable[..., dict[str, Any]]) -> None:
