@@ -1,11 +1,12 @@
 """The same NumPy rays through embreex, trimesh, Warp, Open3D and wive from Python, arrays out.
 
-`ratio`: the other's seconds over wive's for the same query on the same rays, in turn; above 1 wive is
-faster. trimesh's intersector is measured against `wive.Scene` and against its drop-in replacement in
-`wive.trimesh`. With one thread both run on one core and CPU time counts; with all threads wall-clock time
-counts (embreex, trimesh and Warp's CPU device always use one thread). Every library runs with its defaults,
-wive watertight. `hits` is the number of hits found; all-hit counts differ if trimesh skips near hits or
-finds one twice. The last table has microseconds of a whole call for a single ray, median and 99th percentile.
+`ratio`: the other's seconds over wive's for the same query on the same rays, in turn; above 1 wive is faster.
+trimesh's intersector is measured against `wive.Scene` and against its drop-in replacement in `wive.trimesh`.
+With one thread both run on one core and CPU time counts; with all threads wall-clock time counts, and Open3D
+takes as many as wive (embreex, trimesh and Warp's CPU device always use one thread). Every library runs with
+its defaults, wive watertight. `hits` is the number of hits found; all-hit counts differ if trimesh skips near
+hits or finds one twice. The last table has microseconds of a whole call for a single ray, median and 99th
+percentile.
 """
 
 import argparse
@@ -13,7 +14,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from bench.contenders.python_callers import ALL, QUERIES, SCENE, Caller, Ours, absent, others
+from bench.contenders.python_callers import ALL, QUERIES, SCENE, Caller, Ours, absent, others, thread_counts
 from bench.latency import QUICK_SECONDS, measured
 from bench.support import report
 from bench.support.groups import grouped
@@ -24,7 +25,6 @@ from bench.support.timing import (
     QUICK,
     Effort,
     compare,
-    core_count,
     geometric_mean,
     one_core,
     timed,
@@ -32,7 +32,6 @@ from bench.support.timing import (
 )
 
 SCENES = ("living_room", "bmw_m6", "bathroom_salledebain", "furball_embree_tubes")
-OPTIONAL = {"open3d"}  # a run without it is whole
 RAY_KINDS = ("primary", "diffuse", "random")
 RAYS, QUICK_RAYS = 131_072, 4_096
 # All hits take fewer rays, because trimesh casts every ray again from each of its hits.
@@ -73,7 +72,7 @@ def main(options: Sequence[str]) -> None:
     report.print_table(single, SINGLE_COLUMNS, "One ray: microseconds per call")
     print("".join(f"\n{line}" for line in missing))
     content = {"missing": missing, "rows": rows, "means": means, "single": single}
-    whole = scenes.whole and not chosen.quick and chosen.rays == RAY_KINDS and set(absent()) <= OPTIONAL
+    whole = scenes.whole and not chosen.quick and chosen.rays == RAY_KINDS and not missing
     report.save("python", content, chosen.out, whole=whole)
 
 
@@ -86,7 +85,7 @@ def speed_rows(
             rays = recorded.thinned(QUICK_ALL_HITS_RAYS if quick else ALL_HITS_RAYS)
         else:
             rays = recorded.thinned(QUICK_RAYS if quick else RAYS)
-        for threads in dict.fromkeys((1, core_count())):
+        for threads in thread_counts() if rival.threads is None else (rival.threads,):
             for mine in ours.counterparts(rival, threads):
                 yield {
                     "scene": mesh.name,
@@ -128,8 +127,9 @@ def single_rows(
     mesh: Mesh, ours: Ours, rivals: Sequence[Caller], recorded: Rays, quick: bool
 ) -> Iterator[report.Row]:
     """One row per caller, wive's for every query."""
-    callers = [*(ours.by_scene(query, 1) for query in QUERIES), *rivals]
-    callers += [caller for rival in rivals for caller in ours.counterparts(rival, 1) if caller.name != SCENE]
+    alone = [rival for rival in rivals if rival.threads in (None, 1)]
+    callers = [*(ours.by_scene(query, 1) for query in QUERIES), *alone]
+    callers += [caller for rival in alone for caller in ours.counterparts(rival, 1) if caller.name != SCENE]
     parts = [(recorded.origins[i : i + 1], recorded.directions[i : i + 1]) for i in range(SINGLE_RAYS)]
     for caller in callers:
         calls = [lambda part=part, caller=caller: caller.call(*part) for part in parts]

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 import wive
 from bench.support.scenes import Mesh
+from bench.support.timing import core_count
 
 Array = NDArray[np.float32]
 
@@ -34,6 +35,7 @@ class Caller:
     hits: Callable[[Any], int]
     method: str = ""  # trimesh's intersector method, which wive.trimesh has under the same name
     options: dict[str, bool] = field(default_factory=dict)
+    threads: int | None = None  # None for libraries that can't say, and use one
 
 
 class Ours:
@@ -98,6 +100,11 @@ def others(mesh: Mesh) -> Iterator[Caller]:
     for module, make in makers.items():
         if importlib.util.find_spec(module) is not None:
             yield from make(mesh)
+
+
+def thread_counts() -> list[int]:
+    """One thread, and as many as there are cores."""
+    return sorted({1, core_count()})
 
 
 def absent() -> list[str]:
@@ -181,19 +188,25 @@ def _open3d(mesh: Mesh) -> Iterator[Caller]:
     def tensor(origins: Array, directions: Array) -> Any:
         return o3d.core.Tensor(np.concatenate([origins, directions], axis=1))
 
-    def cast(origins: Array, directions: Array) -> Any:
-        found = scene.cast_rays(tensor(origins, directions))
+    def cast(origins: Array, directions: Array, threads: int) -> Any:
+        found = scene.cast_rays(tensor(origins, directions), nthreads=threads)
         return [found[name].numpy() for name in ("t_hit", "primitive_ids", "primitive_uvs")]
 
-    yield Caller(
-        "Open3D cast_rays, all threads",
-        CLOSEST,
-        cast,
-        lambda found: int(np.count_nonzero(np.isfinite(found[0]))),
-    )
-    yield Caller(
-        "Open3D test_occlusions, all threads",
-        ANY,
-        lambda origins, directions: scene.test_occlusions(tensor(origins, directions)).numpy(),
-        lambda mask: int(np.count_nonzero(mask)),
-    )
+    def occluded(origins: Array, directions: Array, threads: int) -> Any:
+        return scene.test_occlusions(tensor(origins, directions), nthreads=threads).numpy()
+
+    for threads in thread_counts():
+        yield Caller(
+            "Open3D cast_rays",
+            CLOSEST,
+            partial(cast, threads=threads),
+            lambda found: int(np.count_nonzero(np.isfinite(found[0]))),
+            threads=threads,
+        )
+        yield Caller(
+            "Open3D test_occlusions",
+            ANY,
+            partial(occluded, threads=threads),
+            lambda mask: int(np.count_nonzero(mask)),
+            threads=threads,
+        )
