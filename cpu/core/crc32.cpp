@@ -14,7 +14,7 @@ namespace {
 
 // A CRC is a polynomial over {0, 1} modulo this one of degree 32, whose leading term is left out (PKWARE's APPNOTE.TXT
 // 4.4.7). The highest power of x is in the lowest bit.
-constexpr std::uint32_t polynomial = 0xedb88320u, one = 1u << 31;
+constexpr std::uint32_t polynomial = 0xedb88320u;
 
 constexpr std::uint32_t times_x(std::uint32_t value) { return value >> 1 ^ (value & 1 ? polynomial : 0); }
 
@@ -53,6 +53,8 @@ std::uint32_t by_tables(std::uint32_t state, std::span<const std::byte> data) {
 
 #define WIVE_CLMUL __attribute__((target("pclmul,sse2")))
 #define WIVE_WIDE_CLMUL __attribute__((target("vpclmulqdq,avx512f,pclmul")))
+
+constexpr std::uint32_t one = 1u << 31;
 
 constexpr std::uint64_t power_of_x(int n) {
     std::uint32_t power = one;
