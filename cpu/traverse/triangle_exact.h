@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "core/error_free.h"
 #include "core/layout.h"
 #include "traverse/exact_hit.h"
 #include "traverse/frame.h"
@@ -107,10 +108,7 @@ public:
             x[k] = away(0) - shear_x * z[k];
             y[k] = away(1) - shear_y * z[k];
         }
-        for (int k = 0; k < 3; ++k) {
-            const int i = (k + 1) % 3, j = (k + 2) % 3;
-            weight[k] = x[i] * y[j] - y[i] * x[j];
-        }
+        weigh(found);
         const Double4 low = lowest(weight), high = highest(weight);
         const Double4 bound = Double4::all(ray_.weight_bound), minus_bound = Double4::all(-ray_.weight_bound);
         hit_mask = corners.used(less_equal(minus_bound, low) | less_equal(high, bound));
@@ -120,43 +118,13 @@ public:
     // Offers the hits to the query; true once the query is done.
     template <class Corners, RayQuery<float> Query>
     [[gnu::always_inline]] bool solve(const Corners& corners, const Found& found, Query& query) const {
-        const auto& [may_be_hit, x, y, z, weight] = found;
-        const Double4 low = lowest(weight), high = highest(weight), near = lowest(z), far = highest(z);
-        constexpr double e = 0x1p-53;
-        // The error of these weights: e (r + 4 e Z) (13 r + 21 Z).
-        const Double4 along = max(abs(near), abs(far));
-        Double4 aside = max(abs(x[0]), abs(y[0]));
-        for (int k = 1; k < 3; ++k) aside = max(aside, max(abs(x[k]), abs(y[k])));
-        const Double4 error =
-            (aside + Double4::all(4 * e) * along) * (Double4::all(13 * e) * aside + Double4::all(21 * e) * along);
-        const Double4 minus_error = Double4::all(0.0) - error;
-        unsigned hit_mask = may_be_hit & (less_equal(minus_error, low) | less_equal(high, error));
-        const unsigned on_edge = less_equal(low, error) & less_equal(minus_error, high);  // or may be
-        if ((hit_mask & on_edge) != 0) [[unlikely]]
-            hit_mask &= ~ray_.edge_on(corners, ray_.caller_direction);
-        if (hit_mask == 0) return false;
-
-        const Double4 inverse_det = Double4::all(1.0) / (weight[0] + weight[1] + weight[2]);
-        const Double4 depth = (weight[0] * z[0] + weight[1] * z[1] + weight[2] * z[2]) * inverse_det;
-        const Double4 weight_error = Double4::all(6.0) * error * abs(inverse_det);
-        const Double4 depth_error = weight_error * (far - near) + Double4::all(12 * e) * along;
-        const Double4 inverse = Double4::all(ray_.inverse);
-        const Rounded t(depth * inverse, depth_error * abs(inverse));
-        // Drops certain misses before the exact test: most doubtful hits are on the surface that a ray starts from, and
-        // lie outside its interval.
-        hit_mask &= on_edge | ~(less(t.high, Float4::all(ray_.caller_tmin)) | less(Float4::all(tmax(query)), t.low));
-        if (hit_mask == 0) return false;
-
-        alignas(16) float ts[4], us[4] = {}, vs[4] = {};
-        unsigned doubt = on_edge | t.store(ts) | equal(t.low, Float4::all(0.0f));  // the sign of zero matters
-        if constexpr (Query::wants_uv) {
-            doubt |= Rounded(weight[1] * inverse_det, weight_error).store(us);
-            doubt |= Rounded(weight[2] * inverse_det, weight_error).store(vs);
-        }
-        for (; hit_mask != 0; hit_mask &= hit_mask - 1) {
-            const int lane = __builtin_ctz(hit_mask);
-            RoundedHit hit = {ts[lane], us[lane], vs[lane]};
-            if (doubt >> lane & 1u) [[unlikely]] {
+        Decided decided = decide<Query::wants_uv>(corners, found, 1.0, tmax(query));
+        if ((decided.hit_mask & decided.doubt) != 0) [[unlikely]]
+            decide_in_pairs<Query::wants_uv>(corners, tmax(query), decided);
+        for (unsigned rest = decided.hit_mask; rest != 0; rest &= rest - 1) {
+            const int lane = __builtin_ctz(rest);
+            RoundedHit hit = {decided.t[lane], decided.u[lane], decided.v[lane]};
+            if (decided.doubt >> lane & 1u) [[unlikely]] {
                 if (!hits_exactly(ray_.caller_ray(), corners_of(corners.block, lane), query.crossings, hit)) continue;
             }
             assert(corners.block.prim_at(lane) >= 0);
@@ -168,6 +136,128 @@ public:
     }
 
 private:
+    static constexpr double e = 0x1p-53;
+
+    // The lanes that are hit or may be, those of them that are in doubt, and the numbers of the others.
+    struct Decided {
+        unsigned hit_mask = 0, doubt = 0;
+        alignas(16) float t[4], u[4] = {}, v[4] = {};
+    };
+
+    // share: by how much less than in find() x and y are off because of z.
+    template <bool wants_uv, class Corners>
+    [[gnu::always_inline]] Decided decide(const Corners& corners, const Found& found, double share, float tmax) const {
+        Decided decided;
+        const auto& [may_be_hit, x, y, z, weight] = found;
+        const Double4 low = lowest(weight), high = highest(weight), near = lowest(z), far = highest(z);
+        // The error of these weights: e (r + 4 e Z) (13 r + 21 Z), with the share of Z.
+        const Double4 along = max(abs(near), abs(far)), z_share = along * Double4::all(share);
+        Double4 aside = max(abs(x[0]), abs(y[0]));
+        for (int k = 1; k < 3; ++k) aside = max(aside, max(abs(x[k]), abs(y[k])));
+        const Double4 error =
+            (aside + Double4::all(4 * e) * z_share) * (Double4::all(13 * e) * aside + Double4::all(21 * e) * z_share);
+        const Double4 minus_error = Double4::all(0.0) - error;
+        unsigned hit_mask = may_be_hit & (less_equal(minus_error, low) | less_equal(high, error));
+        const unsigned on_edge = less_equal(low, error) & less_equal(minus_error, high);  // or may be
+        if ((hit_mask & on_edge) != 0) [[unlikely]]
+            hit_mask &= ~ray_.edge_on(corners, ray_.caller_direction);
+        if (hit_mask == 0) return decided;
+
+        const Double4 inverse_det = Double4::all(1.0) / (weight[0] + weight[1] + weight[2]);
+        const Double4 depth = (weight[0] * z[0] + weight[1] * z[1] + weight[2] * z[2]) * inverse_det;
+        const Double4 weight_error = Double4::all(6.0) * error * abs(inverse_det);
+        const Double4 depth_error = weight_error * (far - near) + Double4::all(12 * e) * along;
+        const Double4 inverse = Double4::all(ray_.inverse);
+        const Rounded t(depth * inverse, depth_error * abs(inverse));
+        // Drops certain misses before the exact test: most doubtful hits are on the surface that a ray starts from, and
+        // lie outside its interval.
+        hit_mask &= on_edge | ~(less(t.high, Float4::all(ray_.caller_tmin)) | less(Float4::all(tmax), t.low));
+        if (hit_mask == 0) return decided;
+        unsigned doubt = on_edge | t.store(decided.t) | equal(t.low, Float4::all(0.0f));  // the sign of zero matters
+        if constexpr (wants_uv) {
+            doubt |= Rounded(weight[1] * inverse_det, weight_error).store(decided.u);
+            doubt |= Rounded(weight[2] * inverse_det, weight_error).store(decided.v);
+        }
+        decided.hit_mask = hit_mask;
+        decided.doubt = doubt;
+        return decided;
+    }
+
+    // Decides the lanes in doubt again, from corners that are rounded once. If the ray comes from afar, or the triangle
+    // is large and the ray passes close to an edge, what rounding in find() left open is mostly decided then.
+    template <bool wants_uv, class Corners>
+    [[gnu::noinline]] void decide_in_pairs(const Corners& corners, float tmax, Decided& decided) const {
+        constexpr double share = 16 * e;
+        const unsigned lanes = decided.hit_mask & decided.doubt;
+        const Decided again = decide<wants_uv>(corners, find_in_pairs(corners.block, lanes), share, tmax);
+        decided.hit_mask = (decided.hit_mask & ~lanes) | again.hit_mask;
+        decided.doubt = again.doubt;
+        for (unsigned rest = again.hit_mask; rest != 0; rest &= rest - 1) {
+            const int lane = __builtin_ctz(rest);
+            decided.t[lane] = again.t[lane];
+            decided.u[lane] = again.u[lane];
+            decided.v[lane] = again.v[lane];
+        }
+    }
+
+    // A number as the sum of two doubles, the second of which is no more than the rounding of the first.
+    struct Pair {
+        double high, low;
+
+        [[gnu::always_inline]] static Pair difference(double a, double b) {
+            return {a - b, rounded_off_sum(a, -b, a - b)};
+        }
+        [[gnu::always_inline]] static Pair quotient(double a, double b) {
+            const double q = a / b, product = q * b;
+            return {q, ((a - product) - rounded_off_product(q, b, product)) / b};
+        }
+        // a - b c
+        [[gnu::always_inline]] static double without_product(Pair a, Pair b, Pair c) {
+            const double product = b.high * c.high;
+            const double low = rounded_off_product(b.high, c.high, product) + (b.high * c.low + b.low * c.high);
+            const Pair rest = difference(a.high, product);
+            return rest.high + (rest.low + (a.low - low));
+        }
+    };
+
+    // What find() finds in some lanes of a block, with all but the last rounding of x and y in pairs.
+    template <class Block>
+    [[gnu::always_inline]] Found find_in_pairs(const Block& block, unsigned lanes) const {
+        alignas(32) double x[3][4] = {}, y[3][4] = {}, z[3][4] = {};
+        const float* direction = ray_.caller_direction;
+        const auto slope = [&](int i) { return Pair::quotient(direction[ray_.axis[i]], direction[ray_.axis[2]]); };
+        const Pair shear_x = slope(0), shear_y = slope(1);
+        for (unsigned rest = lanes; rest != 0; rest &= rest - 1) {
+            const int lane = __builtin_ctz(rest);
+            for (int k = 0; k < 3; ++k) {
+                const auto away = [&](int i) {
+                    return Pair::difference(block.vertex(k, static_cast<int>(ray_.axis[i]), lane), ray_.from[i]);
+                };
+                const Pair depth = away(2);
+                x[k][lane] = Pair::without_product(away(0), shear_x, depth);
+                y[k][lane] = Pair::without_product(away(1), shear_y, depth);
+                z[k][lane] = depth.high;
+            }
+        }
+        Found found;
+        found.hit_mask = lanes;
+        for (int k = 0; k < 3; ++k) {
+            found.x[k] = Double4::load(x[k]);
+            found.y[k] = Double4::load(y[k]);
+            found.z[k] = Double4::load(z[k]);
+        }
+        weigh(found);
+        return found;
+    }
+
+    [[gnu::always_inline]] static void weigh(Found& found) {
+        const auto& [hit_mask, x, y, z, weight] = found;
+        for (int k = 0; k < 3; ++k) {
+            const int i = (k + 1) % 3, j = (k + 2) % 3;
+            found.weight[k] = x[i] * y[j] - y[i] * x[j];
+        }
+    }
+
     [[gnu::always_inline]] static Double4 lowest(const Double4 (&a)[3]) { return min(min(a[0], a[1]), a[2]); }
     [[gnu::always_inline]] static Double4 highest(const Double4 (&a)[3]) { return max(max(a[0], a[1]), a[2]); }
 
