@@ -6,7 +6,7 @@ Users call `wive.Scene`, which checks arguments; here only what memory safety ne
 """
 
 from collections.abc import Callable, Sequence
-from typing import Any, Literal, TypeAlias, TypeVar
+from typing import Any, ClassVar, Literal, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -63,9 +63,11 @@ def crc32(data: NDArray[np.uint8], before: int = 0) -> int:
     """The CRC-32 of zip archives of the bytes (n,) behind others whose CRC is `before`."""
 
 class RunningChecksum:
-    """A checksum of bytes that doesn't depend on the pieces they are added in, but on the size of a block."""
+    """A checksum of bytes that doesn't depend on the pieces they are added in. Blocks have one each."""
 
-    def __init__(self, block: int) -> None: ...
+    block_bytes: ClassVar[int]
+
+    def __init__(self) -> None: ...
     def add(self, data: NDArray[np.uint8]) -> None:
         """Add the bytes (n,). The interpreter lock is released."""
 

@@ -12,20 +12,24 @@
 
 namespace wive {
 
-// It doesn't depend on the pieces: each block of so many bytes has a checksum, and these are chained.
+// It doesn't depend on the pieces: each block has a checksum, and these are chained.
 class RunningChecksum {
 public:
-    explicit RunningChecksum(std::size_t block) : block_(block) { last_.reserve(block); }
+    // Bytes under one checksum: whole rows of 6 or 8 numbers of 4 or 8 bytes, few enough to stay in a cache while they
+    // are read, summed up and split into origins and directions.
+    static constexpr std::size_t block_bytes = 3 << 17;
+
+    RunningChecksum() { last_.reserve(block_bytes); }
 
     void add(std::span<const std::byte> data) {
         Threads alone(1);
         while (!data.empty()) {
-            const auto taken = data.first(std::min(data.size(), block_ - last_.size()));
-            if (taken.size() == block_) {
+            const auto taken = data.first(std::min(data.size(), block_bytes - last_.size()));
+            if (taken.size() == block_bytes) {
                 chain(taken, alone);
             } else {
                 last_.insert(last_.end(), taken.begin(), taken.end());
-                if (last_.size() == block_) {
+                if (last_.size() == block_bytes) {
                     chain(last_, alone);
                     last_.clear();
                 }
@@ -45,7 +49,6 @@ private:
         blocks_ = checksum(std::as_bytes(std::span(next)), alone);
     }
 
-    const std::size_t block_;
     std::uint64_t blocks_ = 0;
     std::vector<std::byte> last_;
 };

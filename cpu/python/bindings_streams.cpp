@@ -89,10 +89,9 @@ std::ptrdiff_t read_at(int file, std::span<std::byte> buffer, std::int64_t place
 template <class Real>
 std::int64_t read_rays(int file, std::int64_t place, Array<Real> origins, Array<Real> directions,
                        std::optional<Array<Real>> tmin, std::optional<Array<Real>> tmax, RunningChecksum* sum) {
-    constexpr py::ssize_t step_bytes = 3 << 17;  // BLOCK of wive/_internal/ray_files.py
     const SplitRays<Real> rays(origins, directions, tmin, tmax);
     const py::ssize_t columns = rays.columns(), row = columns * static_cast<py::ssize_t>(sizeof(Real));
-    const py::ssize_t step = step_bytes / row;
+    const py::ssize_t step = static_cast<py::ssize_t>(RunningChecksum::block_bytes) / row;
     std::int64_t total = 0;
     int failed = 0;
     {
@@ -132,7 +131,8 @@ void bind_streams(py::module_& m) {
         },
         array_arg("data"), py::arg("before") = 0);
     py::class_<RunningChecksum>(m, "RunningChecksum")
-        .def(py::init<std::size_t>(), py::arg("block"))
+        .def(py::init<>())
+        .def_readonly_static("block_bytes", &RunningChecksum::block_bytes)
         .def(
             "add",
             [](RunningChecksum& self, const Array<std::uint8_t>& data) {

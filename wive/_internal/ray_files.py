@@ -22,9 +22,6 @@ from wive._internal.precision import FLOAT64
 EXPECTED = "a file of rays, (n,6) or (n,8) in an .npy or `origins` and `directions` in an .npz"
 NAMES = ("ox", "oy", "oz", "dx", "dy", "dz", "tmin", "tmax")
 SKIPPED = "_"
-# Bytes of rays under one checksum: whole rows of 6 or 8 numbers of 4 or 8 bytes, few enough to stay in a
-# cache while they are read, summed up and split into origins and directions. Also in bindings_streams.cpp.
-BLOCK = 3 << 17
 
 Array = NDArray[Any]
 Rays = tuple[Any, Any, Any, Any]  # origins, directions, tmin, tmax
@@ -98,7 +95,7 @@ class RunningChecksum:
 
     def __init__(self) -> None:
         """Of nothing."""
-        self.core = _cpu.RunningChecksum(BLOCK)
+        self.core = _cpu.RunningChecksum()
 
     def add(self, array: Array) -> None:
         """Add the array's bytes."""
@@ -198,7 +195,7 @@ def _of_table(rows: Rows, names: Sequence[str]) -> RayReader:
     places = {name: i for i, name in enumerate(names)}
     vectors = [[places[name] for name in NAMES[:3]], [places[name] for name in NAMES[3:6]]]
     dtype = rows.dtype.newbyteorder("=")
-    step = max(1, BLOCK // (rows.dtype.itemsize * len(names)))
+    step = max(1, _cpu.RunningChecksum.block_bytes // (rows.dtype.itemsize * len(names)))
     is_usual = tuple(names[:6]) == NAMES[:6] and dtype in (np.float32, np.float64)
     is_plain = is_usual and tuple(names) in (NAMES[:6], NAMES) and rows.dtype == dtype
 
