@@ -191,7 +191,7 @@ private:
         const unsigned lanes = decided.hit_mask & decided.doubt;
         const Decided again = decide<wants_uv>(corners, find_in_pairs(corners.block, lanes), share, tmax);
         decided.hit_mask = (decided.hit_mask & ~lanes) | again.hit_mask;
-        decided.doubt = again.doubt;
+        decided.doubt = again.doubt & lanes;
         for (unsigned rest = again.hit_mask; rest != 0; rest &= rest - 1) {
             const int lane = __builtin_ctz(rest);
             decided.t[lane] = again.t[lane];

@@ -15,6 +15,7 @@ from support.ray_files import COUNT, FORMS, arrays_of, content_of, small_scene, 
 
 import wive
 from wive._internal import hit_columns, hit_files, progress
+from wive._internal.files import UNFINISHED
 
 OUTPUTS = ["hits.npz", "hits/"]
 QUERIES = ["intersect", "intersect_all"]
@@ -297,6 +298,13 @@ def test_ctrl_c_when_the_output_is_in_place_leaves_it_whole(tmp_path, monkeypatc
         trace(tmp_path, output)
     assert sorted(path.name for path in tmp_path.iterdir()) == [output.rstrip("/"), "rays.npy"]
     assert trace(tmp_path, output, resume=True).resumed == COUNT
+
+
+def test_a_run_killed_while_its_record_was_written_can_be_resumed(tmp_path):
+    interrupt(tmp_path)
+    (tmp_path / "hits.npz.part" / "0123456789abcdef".join(UNFINISHED)).write_text("{")
+    assert trace(tmp_path, resume=True).resumed > 0
+    assert not (tmp_path / "hits.npz.part").exists()
 
 
 def test_folders_of_others_are_left_alone(tmp_path):

@@ -147,11 +147,34 @@ def test_rays_that_touch_the_box_of_the_tree_keep_their_hits(accuracy: str, node
             wive.Scene(vertices, faces, accuracy=accuracy, nodes=nodes, **options)
             for options in ({"device": "cpu"}, {"backend": "scalar"})
         )
-        for tmin in (0.0, -np.inf):
+        usual = core.intersect(origins, directions)
+        assert (usual.prim >= 0).any() == (len(faces) > 0)
+        for tmin in (0.0, -np.inf, np.where(usual.prim >= 0, usual.t, 0)):
             found, wanted = (one.intersect(origins, directions, tmin=tmin) for one in (scene, core))
-            assert (wanted.prim >= 0).any() == (len(faces) > 0)
             for name in ("t", "prim", "uv"):
                 np.testing.assert_array_equal(getattr(found, name), getattr(wanted, name), err_msg=mesh)
+
+
+@pytest.mark.parametrize("accuracy", ACCURACIES)
+def test_rays_in_a_side_of_the_box_of_the_tree_keep_their_hits(accuracy: str) -> None:
+    """A flat mesh: rays start at its hits, and one runs almost within the plane of a side of its box."""
+    flat = np.float32([[-0.9, -0.9, 0.9], [0.9, -0.9, 0.9], [0, 0.9, 0.9]])
+    long = np.float32([[0, -6440.43115234375, 1], [0, -4203.7109375, 1], [0, -7034.26123046875, 0]])
+    random = np.random.default_rng(8)
+    aims = random.uniform([-0.3, -0.3, 0.5], [0.3, 0.3, 1.0], (400, 3)).astype(np.float32)
+    one = np.float32([[-0.676872968673706, -0.0005970357451587915, 0.9999957084655762]])
+    way = np.float32([[0.676872968673706, -5831.5732421875, 1.4691261540633604e-08]])
+    for vertices, origins, directions in ((flat, np.zeros_like(aims), aims), (long, one, way)):
+        scene, core = (
+            wive.Scene(vertices, [[0, 1, 2]], accuracy=accuracy, **options)
+            for options in ({"device": "cpu"}, {"backend": "scalar"})
+        )
+        usual = core.intersect(origins, directions)
+        assert (usual.prim >= 0).any()
+        for tmin in (0.0, np.where(usual.prim >= 0, usual.t, 0)):
+            found, wanted = (one.intersect(origins, directions, tmin=tmin) for one in (scene, core))
+            np.testing.assert_array_equal(found.prim, wanted.prim)
+            np.testing.assert_array_equal(found.t, wanted.t)
 
 
 def test_empty_and_exact_intervals_are_kept_to() -> None:

@@ -42,16 +42,20 @@ def make_keep(lanes: SimpleNamespace, nodes: SimpleNamespace, box_base: int, fra
 def make_meets_tree(frame_type: type) -> wp.Function:
     """The function that says whether a ray meets the box of a tree, by the slab test of nodes.
 
-    It passes all rays that meet a box inside: distances to planes, rounded, keep the planes' order.
+    The box is moved outwards by more than the planes of nodes are (plane_slack_factor in
+    cpu/build/write_node.h), so all rays that meet a box inside pass: distances to planes, rounded, keep the
+    planes' order.
     """
+    slack_factor = 2.0**-19
 
     @without_gradient
     @wp.func
     def meets_tree(extent: wp.vec3, ray: frame_type):
         entry = box_tmin(ray)
         exit = box_tmax(ray.tmax)
+        slack = slack_factor * wp.max(wp.max(extent[0], extent[1]), extent[2])
         for axis in range(3):
-            reach = extent[axis] * wp.abs(ray.rdir[axis])
+            reach = (extent[axis] + slack) * wp.abs(ray.rdir[axis])
             near = ray.near_bias[axis] - reach
             far = reach + ray.far_bias[axis]
             entry = wp.where(near > entry, near, entry)

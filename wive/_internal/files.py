@@ -67,6 +67,10 @@ def check_output(
     return name
 
 
+# How names of files begin and end that are being written, and of those that a killed process has left.
+UNFINISHED = ".wive-", ".part"
+
+
 @contextmanager
 def atomic_write(path: PathLike) -> Iterator[BinaryIO]:
     """An open binary file that becomes `path` when the block ends, and vanishes if it raises.
@@ -75,7 +79,7 @@ def atomic_write(path: PathLike) -> Iterator[BinaryIO]:
     """
     name = check_output(path)
     final = os.path.realpath(name)
-    part = os.path.join(os.path.dirname(final), f".wive-{os.urandom(8).hex()}.part")
+    part = os.path.join(os.path.dirname(final), f"{UNFINISHED[0]}{os.urandom(8).hex()}{UNFINISHED[1]}")
     try:
         replaced = _status(final)
         # Nobody else may read a private file's new content, not even before it has its mode.
@@ -89,6 +93,14 @@ def atomic_write(path: PathLike) -> Iterator[BinaryIO]:
         if isinstance(error, OSError):
             raise named_error(error, name) from error
         raise
+
+
+def remove_unfinished(folder: str) -> None:
+    """Remove what writers that were killed have left in a folder in which none writes now."""
+    begin, end = UNFINISHED
+    for name in os.listdir(folder):
+        if name.startswith(begin) and name.endswith(end):
+            os.unlink(os.path.join(folder, name))
 
 
 def put_in_place(file: BinaryIO, part: str, final: str) -> None:

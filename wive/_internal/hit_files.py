@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wive._internal.files import PathLike, file_name, named_error, put_in_place
+from wive._internal.files import PathLike, file_name, named_error, put_in_place, remove_unfinished
 from wive._internal.flusher import Flusher
 from wive._internal.hit_columns import NPZ, Column, HitColumns
 from wive._internal.hit_records import RECORD, STATE, expect_common, record_of, state_of, write_state
@@ -157,6 +157,7 @@ class HitFile:
         """Make the folder, or go on with one that is there."""
         self._lock_part()
         try:
+            remove_unfinished(self.part)
             if not {STATE, CONTENT}.issuperset(os.listdir(self.part)):
                 raise FileExistsError(
                     f"folder {self.part!r} is in the way: choose another output, or move it"
