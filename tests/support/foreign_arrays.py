@@ -18,7 +18,10 @@ class Foreign:
             return Foreign()
 
         def __dlpack__(self, **options):
-            return self.values.__dlpack__(**options)
+            try:
+                return self.values.__dlpack__(**options)
+            except BufferError:  # NumPy before 2.1 doesn't export read-only arrays, as libraries do
+                return self.values.copy().__dlpack__(**options)
 
         def __dlpack_device__(self):
             return self.place

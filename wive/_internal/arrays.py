@@ -183,8 +183,13 @@ class DLPackArrays(_OnWarpStream):
         return np.from_dlpack(array)
 
     def from_numpy(self, array: NDArrayAny) -> Any:
-        """An array over the same memory."""
-        return array if self.make is None else self.make(array)
+        """An array over the same memory, or over a copy if it is read-only and NumPy is older than 2.1."""
+        if self.make is None:
+            return array
+        try:
+            return self.make(array)
+        except BufferError:
+            return self.make(array.copy())
 
     def to_warp(self, array: Any, device: str) -> Any:
         """An array over the same memory."""
