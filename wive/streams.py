@@ -13,7 +13,7 @@ from numpy.typing import DTypeLike
 
 from wive import _cpu
 from wive._internal import arguments
-from wive._internal.files import PathLike, check_output, file_name, named_error
+from wive._internal.files import NOTHING_WRITTEN, PathLike, check_output, file_name, named_error
 from wive._internal.helper_thread import HelperThread
 from wive._internal.hit_columns import Column
 from wive._internal.hit_files import HitFile
@@ -287,7 +287,7 @@ def _tell_kept(error: BaseException, file: HitFile) -> None:
     if isinstance(error, OSError) and error.errno is not None:
         named = named_error(error, file.name)
         if kept:
-            reason = str(named.strerror).removesuffix(", nothing was written")
+            reason = str(named.strerror).removesuffix(NOTHING_WRITTEN)
             raise OSError(error.errno, f"{reason}, {kept}", file.name) from error
         raise named from error
     if kept and isinstance(error, KeyboardInterrupt):

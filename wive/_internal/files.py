@@ -67,6 +67,8 @@ def check_output(
     return name
 
 
+# What is said of a full disk.
+NOTHING_WRITTEN = ", nothing was written"
 # How names of files begin and end that are being written, and of those that a killed process has left.
 UNFINISHED = ".wive-", ".part"
 
@@ -152,5 +154,5 @@ def named_error(error: OSError, name: str) -> OSError:
         return OSError(f"{name}: {one_line(str(error)):.120}")
     reason = error.strerror or os.strerror(error.errno)
     if error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG):
-        reason += ", nothing was written"
+        reason = reason.removesuffix(NOTHING_WRITTEN) + NOTHING_WRITTEN  # once, if it has been named before
     return OSError(error.errno, reason, name)
