@@ -62,7 +62,7 @@ def top_level(body: list[ast.stmt]) -> Iterator[ast.Import | ast.ImportFrom]:
 
 
 def assert_no_circles(arrows: list[tuple[str, str]]) -> None:
-    graph = TopologicalSorter[str]()
+    graph: TopologicalSorter[str] = TopologicalSorter()
     for source, target in arrows:
         graph.add(source, target)
     graph.prepare()  # raises CycleError, naming the circle
