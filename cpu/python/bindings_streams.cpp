@@ -35,7 +35,8 @@ public:
         for (std::optional<Array<Real>>* limit : {&tmin, &tmax})
             if (*limit)
                 expect((*limit)->ndim() == 1 && (*limit)->shape(0) == count_, "tmin, tmax: expected shape (n,)");
-        if (tmin) tmin_ = tmin->mutable_data(), tmax_ = tmax->mutable_data();
+        if (tmin) tmin_ = tmin->mutable_data();
+        if (tmax) tmax_ = tmax->mutable_data();
     }
 
     py::ssize_t count() const { return count_; }
