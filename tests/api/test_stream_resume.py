@@ -323,6 +323,30 @@ def test_folders_of_others_are_left_alone(tmp_path):
     assert sorted(path.name for path in (tmp_path / "hits").iterdir()) == ["mine"]
 
 
+@pytest.mark.parametrize("output", ["hits.npz", "hits/"])
+def test_a_folder_of_others_beside_a_complete_output_is_left_alone(tmp_path, output):
+    trace(tmp_path, output)
+    part = tmp_path / f"{output.rstrip('/')}.part"
+    part.mkdir()
+    (part / "mine").write_text("mine")
+    with pytest.raises(FileExistsError, match="is in the way"):
+        trace(tmp_path, output, resume=True)
+    assert (part / "mine").read_text() == "mine"
+
+
+def test_ctrl_c_before_a_folder_is_looked_into_leaves_what_others_have_there(tmp_path, monkeypatch):
+    (tmp_path / "hits.npz.part").mkdir()
+    (tmp_path / "hits.npz.part" / "mine").write_text("mine")
+
+    def interrupted(folder):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(hit_files, "unfinished", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        trace(tmp_path)
+    assert (tmp_path / "hits.npz.part" / "mine").read_text() == "mine"
+
+
 def test_two_runs_don_t_write_one_output(tmp_path):
     name, _ = write_rays("npy", tmp_path, some_rays())
     scene = small_scene()

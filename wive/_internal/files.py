@@ -97,12 +97,10 @@ def atomic_write(path: PathLike) -> Iterator[BinaryIO]:
         raise
 
 
-def remove_unfinished(folder: str) -> None:
-    """Remove what writers that were killed have left in a folder in which none writes now."""
+def unfinished(folder: str) -> list[str]:
+    """The names of what writers that were killed have left in a folder in which none writes now."""
     begin, end = UNFINISHED
-    for name in os.listdir(folder):
-        if name.startswith(begin) and name.endswith(end):
-            os.unlink(os.path.join(folder, name))
+    return [name for name in os.listdir(folder) if name.startswith(begin) and name.endswith(end)]
 
 
 def put_in_place(file: BinaryIO, part: str, final: str) -> None:

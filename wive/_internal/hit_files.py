@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wive._internal.files import PathLike, file_name, named_error, put_in_place, remove_unfinished
+from wive._internal.files import PathLike, file_name, named_error, put_in_place, unfinished
 from wive._internal.flusher import Flusher
 from wive._internal.hit_columns import NPZ, Column, HitColumns
 from wive._internal.hit_records import RECORD, STATE, expect_common, record_of, state_of, write_state
@@ -133,7 +133,7 @@ class HitFile:
         return os.path.exists(self._content if self.is_folder else os.path.join(self._content, NPZ))
 
     def _lock_part(self) -> None:
-        """Make the folder, and keep other runs away; OSError if there is one."""
+        """Make the folder, and keep other runs away; OSError if there is one, or if it holds files of others."""
         if sys.platform == "win32":
             raise OSError(f"{self.name}: can't be written piece by piece on Windows: use wive.stream")
         import fcntl
@@ -152,16 +152,17 @@ class HitFile:
             raise OSError(f"{one_line(self.part)}: another run is writing there: wait for its end") from None
         except OSError as error:
             raise named_error(error, self.part) from error
+        left = unfinished(self.part)
+        if not {STATE, CONTENT, *left}.issuperset(os.listdir(self.part)):
+            self.close()
+            raise FileExistsError(f"folder {self.part!r} is in the way: choose another output, or move it")
+        for name in left:
+            os.unlink(os.path.join(self.part, name))
 
     def _take_part(self, resume: bool) -> None:
         """Make the folder, or go on with one that is there."""
         self._lock_part()
         try:
-            remove_unfinished(self.part)
-            if not {STATE, CONTENT}.issuperset(os.listdir(self.part)):
-                raise FileExistsError(
-                    f"folder {self.part!r} is in the way: choose another output, or move it"
-                )
             state = state_of(self.part)
             if state is None or not self._has_content():
                 self._clear()
@@ -220,10 +221,11 @@ class HitFile:
             os.close(lock)
 
     def _remove(self) -> None:
-        """Remove the folder."""
+        """Remove the folder, unless there are files of others."""
         self._flusher.close()  # it may be about to write a record
         self._clear()
-        shutil.rmtree(self.part, ignore_errors=True)
+        with suppress(OSError):
+            os.rmdir(self.part)
         self.close()
 
     def _clear(self) -> None:
