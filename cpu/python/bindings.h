@@ -33,6 +33,11 @@ namespace py = pybind11;
 template <class T>
 using Array = py::array_t<T, py::array::c_style>;
 
+template <class T>
+std::span<const std::byte> bytes_of(const Array<T>& array) {
+    return std::as_bytes(std::span(array.data(), static_cast<std::size_t>(array.size())));
+}
+
 // An array argument that is not converted: it must have the dtype and the layout.
 inline py::arg array_arg(const char* name) { return py::arg(name).noconvert(); }
 
@@ -83,9 +88,7 @@ struct Stored {
     std::string name;           // of the file, for errors
     py::object source;          // Python's record of it
 
-    std::span<const std::byte> bytes() const {
-        return std::as_bytes(std::span(units.data(), static_cast<std::size_t>(units.size())));
-    }
+    std::span<const std::byte> bytes() const { return bytes_of(units); }
 };
 
 // A tree together with the arrays it was built from, which rendering reads.

@@ -16,11 +16,6 @@ namespace {
 
 constexpr const char* parts[] = {"units", "vertices", "faces"};
 
-template <class T>
-std::span<const std::byte> bytes_of(const Array<T>& array) {
-    return std::as_bytes(std::span(array.data(), static_cast<std::size_t>(array.size())));
-}
-
 template <class Real>
 std::unique_ptr<PyBvh> stored_tree(Array<std::uint8_t> units, Array<Real> vertices, Array<std::int32_t> faces,
                                    const std::string& accuracy, const std::string& nodes, const std::string& quality,

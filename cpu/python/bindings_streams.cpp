@@ -17,10 +17,6 @@
 namespace wive {
 namespace {
 
-std::span<const std::byte> bytes_of(const Array<std::uint8_t>& data) {
-    return std::as_bytes(std::span(data.data(), static_cast<std::size_t>(data.size())));
-}
-
 // Arrays of rays that rows of numbers are split into: origin, direction and, of eight numbers, tmin and tmax.
 template <class Real>
 class SplitRays {
