@@ -86,8 +86,6 @@ struct AnyHit {
     bool hit = false;
 
     [[gnu::always_inline]] bool take(unsigned hits) { return hit |= hits != 0; }
-    // Takes a hit that is known to lie in the interval; exact tests call this, with t in the caller's units.
-    [[gnu::always_inline]] bool accept(Real, Real, Real, std::uint32_t) { return hit = true; }
     [[gnu::always_inline]] void write(const HitBatch<Real>& hits, std::size_t i, Real) const { hits.occluded[i] = hit; }
 };
 

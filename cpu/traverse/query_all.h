@@ -22,11 +22,6 @@ struct CountHits {
         count += static_cast<std::int32_t>(hits);
         return false;
     }
-    // Takes a hit that is known to lie in the interval; exact tests call this, with t in the caller's units.
-    [[gnu::always_inline]] bool accept(Real, Real, Real, std::uint32_t) {
-        ++count;
-        return false;
-    }
     [[gnu::always_inline]] void write(const HitBatch<Real>& hits, std::size_t i, Real) const { hits.count[i] = count; }
 };
 
@@ -51,6 +46,7 @@ struct AllHits {
         }
         return false;
     }
+    // Takes a hit that is known to lie in the interval; exact tests call this, with t in the caller's units.
     [[gnu::always_inline]] bool accept(Real t, Real u, Real v, std::uint32_t prim) {
         found->add({ray, t, u, v, static_cast<std::int32_t>(prim)});
         ++count;

@@ -144,7 +144,7 @@ private:
         alignas(16) float t[4], u[4] = {}, v[4] = {};
     };
 
-    // share: by how much less than in find() x and y are off because of z.
+    // share: the error of x and y that comes from z, over that in find().
     template <bool wants_uv, class Corners>
     [[gnu::always_inline]] Decided decide(const Corners& corners, const Found& found, double share, float tmax) const {
         Decided decided;
@@ -200,7 +200,7 @@ private:
         }
     }
 
-    // A number as the sum of two doubles, the second of which is no more than the rounding of the first.
+    // A number as the sum of two doubles: itself rounded, and what rounding took off.
     struct Pair {
         double high, low;
 
@@ -298,7 +298,9 @@ private:
 
     template <class Block, class Query>
     [[gnu::always_inline]] bool accept(const Block& block, int lane, const RoundedHit& hit, Query& query) const {
-        if constexpr (Query::in_order)
+        if constexpr (CountingQuery<Query>)
+            return query.take(1);
+        else if constexpr (Query::in_order)
             return query.accept(hit, block, lane, ray_, [&](const Block& other, int other_lane) {
                 return compare_distances(ray_.caller_ray(), corners_of(block, lane), corners_of(other, other_lane));
             });
