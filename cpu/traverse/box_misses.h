@@ -13,9 +13,9 @@
 
 namespace wive::WIVE_ISA {
 
-// By how much boxes are enlarged here, over the largest coordinate of an origin and of the box, relative to the tree's
-// centre: rounding and the triangle test (frame.h) add up to less than 20u of that. Below the other limit slack might
-// underflow.
+// Boxes are enlarged here by box_slack (O + P), O and P the largest coordinates of the ray's origin and of the box,
+// relative to the tree's centre: rounding and the triangle test (frame.h) add up to less than 20u (O + P). If O + P is
+// below least_box_distance, that might underflow, and no ray is known to miss.
 inline constexpr float box_slack = 0x1p-19f, least_box_distance = 0x1p-90f;
 
 // Whether ray i starts outside of the tree's extent on an axis, leads away from it there and has no tmin before its

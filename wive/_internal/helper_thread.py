@@ -1,4 +1,4 @@
-"""A thread beside the one that called, which may be interrupted at any moment."""
+"""A helper thread, for callers that Ctrl-C may interrupt at any moment."""
 
 from __future__ import annotations
 

@@ -133,7 +133,7 @@ class HitFile:
         return os.path.exists(self._content if self.is_folder else os.path.join(self._content, NPZ))
 
     def _lock_part(self) -> None:
-        """Make the folder, and keep other runs away; OSError if there is one, or if it holds files of others."""
+        """Make the folder and lock it; OSError if another run has it, or if others have files there."""
         if sys.platform == "win32":
             raise OSError(f"{self.name}: can't be written piece by piece on Windows: use wive.stream")
         import fcntl
